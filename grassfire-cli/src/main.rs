@@ -1,0 +1,2 @@
+//! `grassfire`: the command line.
+fn main() {}

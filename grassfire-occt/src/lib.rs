@@ -1,0 +1,1 @@
+//! Thin bridge to OpenCASCADE: the only unsafe code of the project.

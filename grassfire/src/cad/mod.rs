@@ -1,0 +1,1 @@
+//! CAD stage: B-rep -> OpenCASCADE solid, united with the non-design bodies, checked, written as STEP.

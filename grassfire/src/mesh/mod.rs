@@ -1,0 +1,53 @@
+//! Triangle meshes: the soup that files hold, and the validated closed solid.
+
+mod solid;
+
+pub use solid::{Solid, SolidError};
+
+use crate::Vec3;
+
+/// Triangles over shared points. Soup is allowed: this is what files hold.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TriMesh {
+    /// Positions, mm.
+    pub points: Vec<Vec3>,
+    /// Point indices, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Empty, or one tag a triangle: which input body or feature it came from.
+    pub tags: Vec<u32>,
+}
+
+impl TriMesh {
+    /// The three corners of triangle `t`.
+    #[inline]
+    pub fn corners(&self, t: usize) -> [Vec3; 3] {
+        self.triangles[t].map(|v| self.points[v as usize])
+    }
+
+    /// Signed volume (positive when oriented outward), mm3. Summed about the first point to keep precision.
+    pub fn volume(&self) -> f64 {
+        let Some(base) = self.points.first() else { return 0.0 };
+        (0..self.triangles.len())
+            .map(|t| {
+                let [a, b, c] = self.corners(t);
+                (a - base).dot(&(b - base).cross(&(c - base))) / 6.0
+            })
+            .sum()
+    }
+
+    /// Surface area, mm2.
+    pub fn area(&self) -> f64 {
+        (0..self.triangles.len())
+            .map(|t| {
+                let [a, b, c] = self.corners(t);
+                (b - a).cross(&(c - a)).norm() / 2.0
+            })
+            .sum()
+    }
+
+    /// Lower and upper corner of the box around all points; `None` without points.
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        let first = *self.points.first()?;
+        Some(self.points.iter().fold((first, first), |(lo, hi), p| (lo.inf(p), hi.sup(p))))
+    }
+}

@@ -1,0 +1,1 @@
+//! Radii: medial radii mapped onto the skeleton and smoothed.
