@@ -1,5 +1,21 @@
 //! Medial axis: voxel solid -> exact Delaunay -> interior Voronoi complex -> burn-order pruning -> spheres.
 
+mod axis;
+mod burn;
+mod complex;
+mod curves;
+mod delaunay;
+mod options;
+mod predicates;
+mod refit;
+mod spatial_order;
+mod union_find;
+mod voxel_solid;
+
+pub use axis::medial_axis;
+pub use delaunay::{Delaunay, NONE, Tet, delaunay, delaunay_lattice};
+pub use options::{MedialError, MedialOptions};
+
 use crate::Vec3;
 use crate::topology::Betti;
 

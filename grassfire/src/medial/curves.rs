@@ -1,0 +1,130 @@
+//! Pruning of the curves (edges without faces), branch by branch.
+
+use std::collections::BinaryHeap;
+
+use super::burn::{Alive, distance, key, unkey};
+use super::complex::Complex;
+use super::delaunay::NONE;
+
+/// One burnt curve edge.
+struct Burnt {
+    edge: u32,
+    /// The end that burnt first.
+    outer: u32,
+    branch: u32,
+    /// The whole component ends here: nothing of it is left.
+    last: bool,
+}
+
+/// What [`prune_curves`] did.
+#[derive(Debug, Default)]
+pub(super) struct CurveReport {
+    /// Edges taken away.
+    pub(super) removed: usize,
+    /// Edges kept although short, one a component that would have shrunk to a point.
+    pub(super) points: Vec<u32>,
+}
+
+/// Removes dangling curves whose erosion thickness is small.
+///
+/// 1. Burn all curves from their tips, as faces burn from rims; where branches meet, the latest fire
+///    goes on. A branch is what one fire burnt from its tip to the place where it had to stop.
+/// 2. A branch is significant when its erosion thickness at its root exceeds `limit(radius there)`.
+///    Judging at the root, not edge by edge from the tip, is what keeps lattice zig-zag at the tips
+///    from blocking the fire.
+/// 3. Keep significant branches and whatever carries something kept. A component that would vanish
+///    keeps one edge.
+pub(super) fn prune_curves(complex: &Complex, alive: &mut Alive, limit: impl Fn(f32) -> f32) -> CurveReport {
+    let (burnt, significant) = burn_curves(complex, alive, limit);
+    let mut carries = vec![false; complex.radii.len()];
+    let mut report = CurveReport::default();
+    for b in &burnt {
+        let forced = b.last && !significant[b.branch as usize] && !carries[b.outer as usize];
+        if forced {
+            report.points.push(b.edge);
+        }
+        if forced || significant[b.branch as usize] || carries[b.outer as usize] {
+            complex.edges[b.edge as usize].iter().for_each(|&v| carries[v as usize] = true);
+        } else {
+            alive.edges[b.edge as usize] = false;
+            report.removed += 1;
+        }
+    }
+    report
+}
+
+fn burn_curves(complex: &Complex, alive: &Alive, limit: impl Fn(f32) -> f32) -> (Vec<Burnt>, Vec<bool>) {
+    let is_curve: Vec<bool> =
+        (0..complex.edges.len() as u32).map(|e| alive.edges[e as usize] && alive.faces_at(complex, e).next().is_none()).collect();
+    let mut left = is_curve.clone();
+    let at = Incidence::of(complex, &is_curve);
+    let mut degree = vec![0u32; complex.radii.len()];
+    for (ends, _) in complex.edges.iter().zip(&alive.edges).filter(|(_, alive)| **alive) {
+        ends.iter().for_each(|&v| degree[v as usize] += 1);
+    }
+    let mut front: BinaryHeap<_> =
+        (0..degree.len()).filter(|&v| degree[v] == 1).map(|v| key(complex.radii[v], v as u32)).collect();
+    let mut branch_of = vec![NONE; degree.len()];
+    let mut burnt: Vec<Burnt> = Vec::new();
+    let mut significant: Vec<bool> = Vec::new();
+    while let Some(entry) = front.pop() {
+        let (start, outer) = unkey(entry);
+        let branch = branch_of[outer as usize];
+        if degree[outer as usize] == 0 && branch != NONE {
+            // Another fire took the edge ahead: this is where the branch ends.
+            let radius = complex.radii[outer as usize];
+            significant[branch as usize] = start - radius > limit(radius);
+        }
+        let edge = at.edges(outer).iter().copied().find(|&e| left[e as usize]);
+        let (1, Some(edge)) = (degree[outer as usize], edge) else { continue };
+        let [a, b] = complex.edges[edge as usize];
+        let inner = if a == outer { b } else { a };
+        let (o, i) = (outer as usize, inner as usize);
+        let time = (start + distance(&complex.centres[o], &complex.centres[i])).max(complex.radii[i]);
+        let branch = if branch == NONE {
+            significant.push(false);
+            significant.len() as u32 - 1
+        } else {
+            branch
+        };
+        left[edge as usize] = false;
+        degree[o] -= 1;
+        degree[i] -= 1;
+        burnt.push(Burnt { edge, outer, branch, last: degree[i] == 0 });
+        if degree[i] == 1 && at.edges(inner).iter().any(|&e| left[e as usize]) {
+            branch_of[i] = branch;
+            front.push(key(time, inner));
+        } else {
+            significant[branch as usize] = time - complex.radii[i] > limit(complex.radii[i]);
+        }
+    }
+    (burnt, significant)
+}
+
+/// Curve edges at each vertex.
+struct Incidence {
+    start: Vec<u32>,
+    edges: Vec<u32>,
+}
+
+impl Incidence {
+    fn of(complex: &Complex, wanted: &[bool]) -> Self {
+        let mut start = vec![0u32; complex.radii.len() + 1];
+        let ends = || complex.edges.iter().enumerate().filter(|(e, _)| wanted[*e]).flat_map(|(e, ends)| ends.map(|v| (v as usize, e as u32)));
+        ends().for_each(|(v, _)| start[v + 1] += 1);
+        for v in 0..complex.radii.len() {
+            start[v + 1] += start[v];
+        }
+        let mut fill = start.clone();
+        let mut edges = vec![0; start[complex.radii.len()] as usize];
+        for (v, e) in ends() {
+            edges[fill[v] as usize] = e;
+            fill[v] += 1;
+        }
+        Self { start, edges }
+    }
+
+    fn edges(&self, v: u32) -> &[u32] {
+        &self.edges[self.start[v as usize] as usize..self.start[v as usize + 1] as usize]
+    }
+}
