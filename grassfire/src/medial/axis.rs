@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::burn::{Alive, FaceSpheres, burn, regrow};
+use super::burn::{Alive, FaceSpheres, burn, distance, regrow};
 use super::complex::Complex;
 use super::curves::prune_curves;
 use super::delaunay::{NONE, delaunay_lattice};
@@ -27,7 +27,7 @@ const STAGE: &str = "medial";
 /// 4. Burn it once to find the erosion thickness (how much longer than its radius a place lasts),
 ///    then burn it again, stopping where the thickness is above max(`sheet_noise`, `sheet_ratio` R).
 ///    Sheets whose thickness stays below `ribbon_ratio` R burn to curves. Rims grow back where the
-///    object angle is wide. Dangling curves go when thin at their root.
+///    object angle is wide. Small islands burn to curves too. Dangling curves go when thin at their root.
 ///    Everything is elementary collapses, so the homotopy type cannot change, whatever the options are.
 /// 5. Refit the spheres to the zero level of the field.
 /// 6. Cut the polygons into triangles.
@@ -90,7 +90,7 @@ fn same(wanted: Betti, found: Betti, at: &'static str) -> Result<(), MedialError
     if wanted == found { Ok(()) } else { Err(MedialError::Topology { at, wanted, found }) }
 }
 
-/// Steps 4: what of the complex is kept, and the edges that stand for components without extent.
+/// Step 4: what of the complex is kept, and the edges that stand for components without extent.
 fn prune(
     complex: &Complex,
     spheres: &FaceSpheres,
@@ -106,11 +106,11 @@ fn prune(
     let mut alive = Alive::all(complex);
     let (_, collapses) = burn(complex, spheres, &mut alive, limit, monitor)?;
     let ribbon = ribbons(complex, spheres, &alive, &times, options);
-    drop(times);
-    let ribbon_limit = |f: u32| if ribbon[f as usize] { f32::INFINITY } else { f32::NEG_INFINITY };
-    burn(complex, spheres, &mut alive, ribbon_limit, monitor)?;
-    regrow(complex, spheres, samples, &mut alive, &collapses, options.regrow_sine);
-    drop(collapses);
+    burn(complex, spheres, &mut alive, only(&ribbon), monitor)?;
+    regrow(complex, spheres, samples, &times, &mut alive, &collapses, options.regrow_sine);
+    drop((times, collapses));
+    let island = islands(complex, spheres, &alive, options);
+    burn(complex, spheres, &mut alive, only(&island), monitor)?;
     monitor.step(STAGE, "curves", 0.85)?;
     let report = prune_curves(complex, &mut alive, |r| options.curve_limit(r));
     Ok((alive, report.points))
@@ -125,6 +125,38 @@ fn ribbons(complex: &Complex, spheres: &FaceSpheres, alive: &Alive, times: &[f32
         deepest[s as usize] = deepest[s as usize].max(ratio);
     }
     sheet.iter().map(|&s| s != NONE && f64::from(deepest[s as usize]) < options.ribbon_ratio).collect()
+}
+
+/// Faces of sheets without seams that are too small to be worth a sheet: they flicker along slender members.
+fn islands(complex: &Complex, spheres: &FaceSpheres, alive: &Alive, options: &MedialOptions) -> Vec<bool> {
+    let sheet = alive.sheets(complex);
+    let mut area = vec![0.0f64; complex.faces()];
+    let mut moment = vec![0.0f64; complex.faces()];
+    let mut seam = vec![false; complex.faces()];
+    for (f, &s) in sheet.iter().enumerate().filter(|(_, s)| **s != NONE) {
+        let a = face_area(complex, &spheres.centres[f], f as u32);
+        area[s as usize] += a;
+        moment[s as usize] += a * f64::from(spheres.radii[f]);
+        seam[s as usize] |= complex.edges_of(f as u32).iter().any(|&e| alive.faces_at(complex, e).count() > 2);
+    }
+    let small = |s: usize| !seam[s] && area[s].powi(3) < (options.island_ratio * moment[s]).powi(2);
+    sheet.iter().map(|&s| s != NONE && small(s as usize)).collect()
+}
+
+/// Area of a face as a fan about its centre, in square voxels.
+fn face_area(complex: &Complex, centre: &[f32; 3], face: u32) -> f64 {
+    let triangle = |&e: &u32| {
+        let [p, q] = complex.edges[e as usize].map(|v| &complex.centres[v as usize]);
+        let (a, b, c) = (distance(p, q), distance(q, centre), distance(centre, p));
+        let s = 0.5 * (a + b + c);
+        f64::from((s * (s - a) * (s - b) * (s - c)).max(0.0)).sqrt()
+    };
+    complex.edges_of(face).iter().map(triangle).sum()
+}
+
+/// A burn limit that lets the wanted faces burn and no others.
+fn only(wanted: &[bool]) -> impl Fn(u32) -> f32 {
+    |f| if wanted[f as usize] { f32::INFINITY } else { f32::NEG_INFINITY }
 }
 
 /// Steps 5 and 6.

@@ -163,29 +163,38 @@ pub(super) fn burn(
 
 /// Puts burnt faces back, last burnt first, where that only widens a kept sheet at its rim.
 ///
-/// A face returns with its free edge (an anti-collapse) when its object angle is wide (`sine` is the
-/// least sine of half the angle), its other edges are alive, and it touches kept rims only: never a
-/// seam and never an inner edge, so that no new seam arises.
-pub(super) fn regrow(complex: &Complex, spheres: &FaceSpheres, samples: &[[i32; 3]], alive: &mut Alive, collapses: &[Collapse], sine: f64) -> usize {
-    let mut regrown = 0;
+/// A face returns with its free edge (an anti-collapse) when
+/// 1. its object angle is wide: half of it has a sine above `least_sine`;
+/// 2. its other edges are alive and touch kept rims only: never a seam and never an inner edge, so that no
+///    new seam arises;
+/// 3. the fire (`times` of the full burn) ran from it into a kept face.
+pub(super) fn regrow(
+    complex: &Complex,
+    spheres: &FaceSpheres,
+    samples: &[[i32; 3]],
+    times: &[f32],
+    alive: &mut Alive,
+    collapses: &[Collapse],
+    least_sine: f64,
+) {
     for &Collapse { face, edge } in collapses.iter().rev() {
-        let [p, q] = complex.face_samples[face as usize].map(|s| samples[s as usize]);
+        let f = face as usize;
+        let [p, q] = complex.face_samples[f].map(|s| samples[s as usize]);
         let apart = (0..3).map(|k| f64::from(p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
-        if apart <= 2.0 * f64::from(spheres.radii[face as usize]) * sine {
+        if apart <= 2.0 * f64::from(spheres.radii[f]) * least_sine {
             continue;
         }
         let mut touching = 0;
         let mut allowed = true;
+        let mut outwards = false;
         for &e in complex.edges_of(face).iter().filter(|&&e| e != edge) {
-            let kept = alive.faces_at(complex, e).count();
-            touching = touching.max(kept);
             allowed &= alive.edges[e as usize];
+            touching = touching.max(alive.faces_at(complex, e).count());
+            outwards |= alive.faces_at(complex, e).any(|g| times[g as usize] >= times[f]);
         }
-        if allowed && touching == 1 {
-            alive.faces[face as usize] = true;
+        if allowed && outwards && touching == 1 {
+            alive.faces[f] = true;
             alive.edges[edge as usize] = true;
-            regrown += 1;
         }
     }
-    regrown
 }

@@ -29,6 +29,7 @@ pub(super) struct CurveReport {
 ///
 /// 1. Burn all curves from their tips, as faces burn from rims; where branches meet, the latest fire
 ///    goes on. A branch is what one fire burnt from its tip to the place where it had to stop.
+///    Time runs along chords of a few voxels.
 /// 2. A branch is significant when its erosion thickness at its root exceeds `limit(radius there)`.
 ///    Judging at the root, not edge by edge from the tip, is what keeps lattice zig-zag at the tips
 ///    from blocking the fire.
@@ -67,6 +68,7 @@ fn burn_curves(complex: &Complex, alive: &Alive, limit: impl Fn(f32) -> f32) -> 
     let mut branch_of = vec![NONE; degree.len()];
     let mut burnt: Vec<Burnt> = Vec::new();
     let mut significant: Vec<bool> = Vec::new();
+    let mut anchors: Vec<Anchor> = Vec::new();
     while let Some(entry) = front.pop() {
         let (start, outer) = unkey(entry);
         let branch = branch_of[outer as usize];
@@ -80,13 +82,14 @@ fn burn_curves(complex: &Complex, alive: &Alive, limit: impl Fn(f32) -> f32) -> 
         let [a, b] = complex.edges[edge as usize];
         let inner = if a == outer { b } else { a };
         let (o, i) = (outer as usize, inner as usize);
-        let time = (start + distance(&complex.centres[o], &complex.centres[i])).max(complex.radii[i]);
         let branch = if branch == NONE {
             significant.push(false);
+            anchors.push(Anchor { place: complex.centres[o], time: start });
             significant.len() as u32 - 1
         } else {
             branch
         };
+        let time = anchors[branch as usize].run_to(&complex.centres[i]).max(start).max(complex.radii[i]);
         left[edge as usize] = false;
         degree[o] -= 1;
         degree[i] -= 1;
@@ -99,6 +102,28 @@ fn burn_curves(complex: &Complex, alive: &Alive, limit: impl Fn(f32) -> f32) -> 
         }
     }
     (burnt, significant)
+}
+
+/// Where and when a fire last set its bearings: it is timed along chords of [`CHORD`] voxels, for a
+/// path along Voronoi edges zigzags on a lattice and would be far too long.
+struct Anchor {
+    place: [f32; 3],
+    time: f32,
+}
+
+/// Length over which zigzag is ignored, in voxels.
+const CHORD: f32 = 4.0;
+
+impl Anchor {
+    /// When the fire reaches `place`.
+    fn run_to(&mut self, place: &[f32; 3]) -> f32 {
+        let chord = distance(&self.place, place);
+        let time = self.time + chord;
+        if chord >= CHORD {
+            *self = Self { place: *place, time };
+        }
+        time
+    }
 }
 
 /// Curve edges at each vertex.

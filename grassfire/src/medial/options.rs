@@ -19,6 +19,8 @@ pub struct MedialOptions {
     pub ribbon_ratio: f64,
     /// Sine of half the object angle above which burnt rims grow back.
     pub regrow_sine: f64,
+    /// A sheet without seams whose area is below the square of this multiple of its mean radius becomes a curve.
+    pub island_ratio: f64,
     /// Least erosion thickness of a dangling curve at its root in voxels.
     pub curve_noise: f64,
     /// Least erosion thickness of a dangling curve at its root as a multiple of the radius there.
@@ -36,6 +38,7 @@ impl Default for MedialOptions {
             sheet_ratio: 0.5,
             ribbon_ratio: 1.0,
             regrow_sine: 0.75,
+            island_ratio: 3.0,
             curve_noise: 4.0,
             curve_ratio: 1.2,
             refit_rest: 0.3,
@@ -61,6 +64,7 @@ impl MedialOptions {
             ("sheet_ratio", self.sheet_ratio),
             ("ribbon_ratio", self.ribbon_ratio),
             ("regrow_sine", self.regrow_sine),
+            ("island_ratio", self.island_ratio),
             ("curve_noise", self.curve_noise),
             ("curve_ratio", self.curve_ratio),
             ("refit_rest", self.refit_rest),
