@@ -1,8 +1,14 @@
 //! Triangle meshes: the soup that files hold, and the validated closed solid.
 
+pub mod bvh;
+pub mod distance;
 mod solid;
+pub mod winding;
 
+pub use bvh::{Bvh, Nearest};
+pub use distance::{Distance, DistanceOptions, DistanceSummary, two_sided};
 pub use solid::{Solid, SolidError};
+pub use winding::Winding;
 
 use crate::Vec3;
 
