@@ -1,6 +1,31 @@
 //! Control mesh -> exact G1 bi-5/bi-3 patches -> few B-spline faces -> boundary representation.
 
+mod bezier;
+mod blocks;
+mod brep;
+mod corner;
+mod error;
+mod gauss;
+mod half_edges;
+mod independent;
+mod measure;
+mod motorcycle;
+mod patches;
+mod quality;
+mod tessellate;
+
+pub use bezier::{SurfacePoint, evaluate};
+pub use brep::{BrepOptions, FaceMode, build_brep};
+pub use error::SplineError;
+pub use measure::{area, volume};
+pub use patches::{PatchOptions, patches};
+pub use quality::{FoldReport, G1Report, g1_max, worst_fold};
+pub use tessellate::{SurfaceSample, TessellateOptions, Tessellation, tessellate};
+
 use crate::Vec3;
+
+/// Name of this stage in progress and warnings.
+const STAGE: &str = "spline";
 
 /// A closed quad mesh: the control net of a Catmull-Clark surface.
 #[derive(Debug, Clone, PartialEq, Default)]
