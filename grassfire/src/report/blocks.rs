@@ -1,0 +1,290 @@
+//! The blocks of `report.json`; field names are the JSON keys.
+
+use serde::Serialize;
+
+use super::Check;
+use crate::monitor::Warning;
+use crate::remesh::{ChangeKind, TopologyChange};
+use crate::topology::{Betti, SurfaceTopology};
+
+/// Everything that a run reports.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Report {
+    /// Version of grassfire.
+    pub version: String,
+    /// The command line or what stands for it.
+    pub command: String,
+    /// Files that were read.
+    pub inputs: Vec<InputFile>,
+    /// The mesh as read and its repairs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub input: Option<InputBlock>,
+    /// The voxel remesh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remesh: Option<RemeshBlock>,
+    /// Topology of every stage.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub topology: Option<TopologyBlock>,
+    /// The quad skeleton.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub skeleton: Option<SkeletonBlock>,
+    /// The thickened and fitted body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body: Option<BodyBlock>,
+    /// The CAD solid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub solid: Option<SolidBlock>,
+    /// Distance between the solid and the remeshed proposal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance: Option<DistanceBlock>,
+    /// Volume of the solid against the proposal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volume: Option<VolumeBlock>,
+    /// The non-design bodies.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub non_design: Vec<NonDesignBlock>,
+    /// Verdicts.
+    pub checks: Vec<Check>,
+    /// Time and memory of every stage.
+    pub stages: Vec<StageEntry>,
+    /// Partial trouble.
+    pub warnings: Vec<Warning>,
+    /// Keys of the papers whose methods the run used (references.bib).
+    pub papers: Vec<String>,
+    /// Files that were written.
+    pub files: Vec<FileEntry>,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct InputFile {
+    /// Path as given.
+    pub path: String,
+    /// SHA-256 of its bytes, hexadecimal.
+    pub sha256: String,
+}
+
+/// A file that was written.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct FileEntry {
+    /// Name inside the output folder.
+    pub path: String,
+    /// What it holds.
+    pub text: String,
+    /// Size.
+    pub bytes: u64,
+}
+
+/// The mesh as read.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct InputBlock {
+    /// Triangles in the file.
+    pub triangles: usize,
+    /// Enclosed volume after repair, mm3.
+    pub volume: f64,
+    /// Edges with one triangle.
+    pub open_edges: usize,
+    /// Edges with more than two triangles.
+    pub non_manifold_edges: usize,
+    /// Connected pieces.
+    pub components: usize,
+    /// What was repaired.
+    pub repairs: Vec<RepairEntry>,
+}
+
+/// One kind of repair.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct RepairEntry {
+    /// Short name, snake_case.
+    pub kind: String,
+    /// How often.
+    pub count: usize,
+    /// What was done.
+    pub text: String,
+}
+
+/// The voxel remesh.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct RemeshBlock {
+    /// Edge of a voxel, mm.
+    pub voxel: f64,
+    /// Triangles of the proposal.
+    pub triangles: usize,
+    /// Volume of the proposal, mm3.
+    pub volume: f64,
+    /// Largest distance from the input surface to the proposal, away from the changes, mm.
+    pub distance_max: f64,
+    /// Genus before the removal of topological noise.
+    pub genus_before: i64,
+    /// Genus after it.
+    pub genus_after: i64,
+    /// Every change of topology.
+    pub changes: Vec<TopologyChangeEntry>,
+}
+
+/// One change of topology.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TopologyChangeEntry {
+    /// What was done.
+    pub kind: ChangeKind,
+    /// Where, mm.
+    pub place: [f64; 3],
+    /// Width, mm.
+    pub size: f64,
+}
+
+impl From<&TopologyChange> for TopologyChangeEntry {
+    fn from(change: &TopologyChange) -> Self {
+        Self { kind: change.kind, place: change.place.into(), size: change.size }
+    }
+}
+
+/// Betti numbers of every stage; they must agree.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct TopologyBlock {
+    /// The voxel solid.
+    pub solid: Betti,
+    /// The full interior Voronoi complex.
+    pub complex: Betti,
+    /// The quad skeleton with its beams.
+    pub skeleton: Betti,
+    /// Every closed surface of the thickened body.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub body: Vec<SurfaceTopology>,
+}
+
+/// The quad skeleton.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct SkeletonBlock {
+    /// Quads.
+    pub quads: usize,
+    /// Edges without quads.
+    pub beams: usize,
+    /// Sheets: connected pieces between seams.
+    pub sheets: usize,
+    /// Curves where three or more sheets meet.
+    pub seams: usize,
+    /// Free borders of sheets.
+    pub rims: usize,
+    /// Medial spheres before the quads.
+    pub spheres: usize,
+    /// Share of inner points with four quads.
+    pub regular_fraction: f64,
+    /// Deviation of the quads' corners from a right angle.
+    pub corner_deviation: CornerDeviation,
+    /// Radii, mm.
+    pub radius: RadiusRange,
+}
+
+/// Deviation from 90 degrees, degrees.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct CornerDeviation {
+    /// Mean.
+    pub mean: f64,
+    /// 95 % of the corners are better.
+    pub p95: f64,
+    /// Worst.
+    pub max: f64,
+}
+
+/// Radii, mm.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct RadiusRange {
+    /// Smallest.
+    pub min: f64,
+    /// Median.
+    pub median: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+/// The thickened and fitted body.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct BodyBlock {
+    /// Quads of the control mesh.
+    pub quads: usize,
+    /// Points with other than four quads.
+    pub extraordinary: usize,
+    /// Pairs of faces that cut each other.
+    pub self_intersections: usize,
+}
+
+/// The CAD solid.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct SolidBlock {
+    /// The CAD kernel's own check.
+    pub valid: bool,
+    /// Solids.
+    pub bodies: usize,
+    /// Faces.
+    pub faces: usize,
+    /// Volume, mm3.
+    pub volume: f64,
+    /// Surface, mm2.
+    pub area: f64,
+    /// Handles, all shells together.
+    pub genus: i64,
+    /// Largest normal angle across edges meant to be smooth, degrees.
+    pub g1_max: f64,
+    /// Shortest edge, mm.
+    pub shortest_edge: f64,
+    /// Largest tolerance of the CAD model, mm.
+    pub max_tolerance: f64,
+    /// Relative difference between the CAD kernel's volume and ours.
+    pub volume_check: f64,
+}
+
+/// Two-sided distance between the solid and the remeshed proposal, non-design regions left out, mm.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct DistanceBlock {
+    /// Root mean square.
+    pub rms: f64,
+    /// 95 % of the surface is nearer.
+    pub p95: f64,
+    /// Largest.
+    pub max: f64,
+    /// Edge of a voxel.
+    pub voxel: f64,
+    /// Largest distance from the solid's non-design faces to the input CAD.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub non_design_max: Option<f64>,
+}
+
+/// Volume of the solid against the proposal.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct VolumeBlock {
+    /// Remeshed proposal, mm3.
+    pub proposal: f64,
+    /// CAD solid, mm3.
+    pub solid: f64,
+    /// (solid - proposal) / proposal.
+    pub relative_difference: f64,
+}
+
+/// One non-design body.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct NonDesignBlock {
+    /// Name of the body.
+    pub name: String,
+    /// File it came from.
+    pub source: String,
+    /// Its faces.
+    pub faces: usize,
+    /// Share of its surface that analytic faces cover.
+    pub coverage: f64,
+    /// It is in the solid as given.
+    pub kept: bool,
+}
+
+/// Time and memory of a stage.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct StageEntry {
+    /// Name of the stage.
+    pub name: String,
+    /// Wall-clock time, s.
+    pub seconds: f64,
+    /// Highest memory of the process until its end, MB.
+    pub peak_memory: f64,
+    /// The result was taken from an earlier run.
+    pub cached: bool,
+}

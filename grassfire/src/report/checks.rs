@@ -1,0 +1,141 @@
+//! Verdicts: measured values against limits.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Report;
+use crate::topology::Betti;
+
+/// What a result must keep to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Limits {
+    /// Largest rms distance to the proposal, voxels.
+    pub distance_rms: f64,
+    /// Largest 95 % distance to the proposal, voxels.
+    pub distance_p95: f64,
+    /// Largest relative difference of volume to the proposal, 0.02 is 2 %.
+    pub volume: f64,
+    /// Largest normal angle across smooth edges, degrees.
+    pub g1: f64,
+    /// Largest relative difference between the CAD kernel's volume and ours.
+    pub volume_check: f64,
+    /// Largest distance from the solid's non-design faces to the given bodies, mm.
+    pub non_design: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            distance_rms: 0.5,
+            distance_p95: 1.0,
+            volume: 0.02,
+            g1: 0.01,
+            volume_check: 1e-4,
+            non_design: 0.01,
+        }
+    }
+}
+
+/// One verdict.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Check {
+    /// Key in `report.json`, such as `solid.valid`.
+    pub name: String,
+    /// What is checked, in words.
+    pub text: String,
+    /// The measured value; absent when it could not be measured, and then the check is not met.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// Largest value allowed (equality is allowed).
+    pub limit: f64,
+    /// Unit of both; empty for counts.
+    pub unit: String,
+    /// The verdict.
+    pub met: bool,
+}
+
+/// All checks that apply to the blocks that are present.
+///
+/// Counts of defects have the limit 0, so that every check reads "value <= limit".
+pub fn judge(report: &Report, limits: &Limits) -> Vec<Check> {
+    let mut checks = Vec::new();
+    topology(report, &mut checks);
+    if let Some(body) = &report.body {
+        let crossings = body.self_intersections as f64;
+        checks.push(check("body.self_intersections", "Faces of the body that cut each other", crossings, 0.0, ""));
+    }
+    solid(report, limits, &mut checks);
+    fidelity(report, limits, &mut checks);
+    checks
+}
+
+fn check(name: &str, text: &str, value: f64, limit: f64, unit: &str) -> Check {
+    let value = value.is_finite().then_some(value);
+    let met = value.is_some_and(|v| v <= limit);
+    Check { name: name.to_owned(), text: text.to_owned(), value, limit, unit: unit.to_owned(), met }
+}
+
+fn defect(name: &str, text: &str, bad: bool) -> Check {
+    check(name, text, f64::from(u8::from(bad)), 0.0, "")
+}
+
+fn topology(report: &Report, checks: &mut Vec<Check>) {
+    let Some(topology) = &report.topology else { return };
+    let differs = |other: Betti| topology.solid != other;
+    checks.push(defect(
+        "topology.complex",
+        "Topology of the medial complex differs from the solid",
+        differs(topology.complex),
+    ));
+    checks.push(defect(
+        "topology.skeleton",
+        "Topology of the skeleton differs from the solid",
+        differs(topology.skeleton),
+    ));
+    if topology.body.is_empty() {
+        return;
+    }
+    let chi: i64 = topology.body.iter().map(|surface| surface.chi).sum();
+    let off = (chi - 2 * topology.skeleton.chi).unsigned_abs() as f64;
+    checks.push(check("topology.body", "Euler number of the body minus twice that of the skeleton", off, 0.0, ""));
+    let open = topology.body.iter().filter(|surface| !surface.closed || !surface.manifold).count();
+    checks.push(check("topology.body.closed", "Body surfaces that are open or not manifold", open as f64, 0.0, ""));
+}
+
+fn solid(report: &Report, limits: &Limits, checks: &mut Vec<Check>) {
+    let Some(solid) = &report.solid else { return };
+    checks.push(defect("solid.valid", "The CAD kernel calls the solid invalid", !solid.valid));
+    let pieces = report.topology.as_ref().map_or(1, |t| t.solid.b0.max(1)) as f64;
+    checks.push(check("solid.bodies", "Separate bodies, at most those of the proposal", solid.bodies as f64, pieces, ""));
+    if solid.bodies == 0 {
+        checks.push(defect("solid.empty", "The solid is empty", true));
+    }
+    checks.push(check("solid.g1_max", "Largest kink across smooth edges", solid.g1_max, limits.g1, "°"));
+    let volume_check = solid.volume_check.abs();
+    let text = "Volume by the CAD kernel against ours, relative";
+    checks.push(check("solid.volume_check", text, volume_check, limits.volume_check, ""));
+}
+
+fn fidelity(report: &Report, limits: &Limits, checks: &mut Vec<Check>) {
+    if let Some(distance) = &report.distance {
+        let voxels = |mm: f64| mm / distance.voxel;
+        let rms = voxels(distance.rms);
+        checks.push(check("distance.rms", "Distance to the proposal, rms", rms, limits.distance_rms, "voxels"));
+        let p95 = voxels(distance.p95);
+        checks.push(check("distance.p95", "Distance to the proposal, 95 %", p95, limits.distance_p95, "voxels"));
+        if let Some(mm) = distance.non_design_max {
+            let text = "Non-design faces against the given bodies";
+            checks.push(check("distance.non_design_max", text, mm, limits.non_design, "mm"));
+        }
+    }
+    if let Some(volume) = &report.volume {
+        let percent = 100.0 * volume.relative_difference.abs();
+        let limit = 100.0 * limits.volume;
+        checks.push(check("volume.relative_difference", "Volume against the proposal", percent, limit, "%"));
+    }
+    let lost = report.non_design.iter().filter(|body| !body.kept).count();
+    if !report.non_design.is_empty() {
+        checks.push(check("non_design.kept", "Non-design bodies not kept as given", lost as f64, 0.0, ""));
+    }
+}

@@ -1,0 +1,180 @@
+//! The papers whose methods a run used; keys as in `references.bib`.
+
+/// One paper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Paper {
+    /// Key in `references.bib`.
+    pub key: &'static str,
+    /// Authors, year, title, where.
+    pub citation: &'static str,
+    /// Digital object identifier; empty when there is none.
+    pub doi: &'static str,
+    /// Stages that use it, as named in `report.json`.
+    pub stages: &'static [&'static str],
+    /// What we took from it.
+    pub used_for: &'static str,
+}
+
+/// All papers, in the order of the stages.
+pub const ALL: &[Paper] = &[
+    Paper {
+        key: "mayer2023",
+        citation: "J. Mayer, M. Denk, S. Wartzack (2023): Reconstruction of topology optimized geometry with casting constraints in a feature-based approach. Proceedings of the Design Society 3 (ICED23).",
+        doi: "10.1017/pds.2023.302",
+        stages: &["medial", "skeleton", "thicken"],
+        used_for: "the chain from a mesh over its medial axis to an editable, thickened quad skeleton",
+    },
+    Paper {
+        key: "blum1967",
+        citation: "H. Blum (1967): A transformation for extracting new descriptors of shape. In: Models for the Perception of Speech and Visual Form, MIT Press.",
+        doi: "",
+        stages: &["medial"],
+        used_for: "the medial axis, and the name",
+    },
+    Paper {
+        key: "barill2018",
+        citation: "G. Barill, N. G. Dickson, R. Schmidt, D. I. W. Levin, A. Jacobson (2018): Fast winding numbers for soups and clouds. ACM Transactions on Graphics 37(4).",
+        doi: "10.1145/3197517.3201337",
+        stages: &["repair", "remesh"],
+        used_for: "inside and outside of dirty meshes",
+    },
+    Paper {
+        key: "gibson1998",
+        citation: "S. F. F. Gibson (1998): Constrained elastic surface nets: generating smooth surfaces from binary segmented data. MICCAI, LNCS 1496.",
+        doi: "10.1007/BFb0056277",
+        stages: &["remesh"],
+        used_for: "closed surfaces from voxels",
+    },
+    Paper {
+        key: "ju2002",
+        citation: "T. Ju, F. Losasso, S. Schaefer, J. Warren (2002): Dual contouring of Hermite data. ACM Transactions on Graphics 21(3).",
+        doi: "10.1145/566654.566586",
+        stages: &["remesh"],
+        used_for: "placing surface points on features",
+    },
+    Paper {
+        key: "taubin1995",
+        citation: "G. Taubin (1995): A signal processing approach to fair surface design. SIGGRAPH.",
+        doi: "10.1145/218380.218473",
+        stages: &["remesh"],
+        used_for: "smoothing without shrinking",
+    },
+    Paper {
+        key: "bowyer1981",
+        citation: "A. Bowyer (1981): Computing Dirichlet tessellations. The Computer Journal 24(2).",
+        doi: "10.1093/comjnl/24.2.162",
+        stages: &["medial"],
+        used_for: "incremental Delaunay triangulation",
+    },
+    Paper {
+        key: "watson1981",
+        citation: "D. F. Watson (1981): Computing the n-dimensional Delaunay tessellation with application to Voronoi polytopes. The Computer Journal 24(2).",
+        doi: "10.1093/comjnl/24.2.167",
+        stages: &["medial"],
+        used_for: "incremental Delaunay triangulation",
+    },
+    Paper {
+        key: "shewchuk1997",
+        citation: "J. R. Shewchuk (1997): Adaptive precision floating-point arithmetic and fast robust geometric predicates. Discrete & Computational Geometry 18.",
+        doi: "10.1007/PL00009321",
+        stages: &["medial"],
+        used_for: "exact predicates",
+    },
+    Paper {
+        key: "amenta2001",
+        citation: "N. Amenta, S. Choi, R. K. Kolluri (2001): The power crust. ACM Symposium on Solid Modeling.",
+        doi: "10.1145/376957.376986",
+        stages: &["medial"],
+        used_for: "poles and local feature size",
+    },
+    Paper {
+        key: "yan2016",
+        citation: "Y. Yan, K. Sykes, E. Chambers, D. Letscher, T. Ju (2016): Erosion thickness on medial axes of 3D shapes. ACM Transactions on Graphics 35(4).",
+        doi: "10.1145/2897824.2925938",
+        stages: &["medial"],
+        used_for: "burn order: which parts of the medial axis matter",
+    },
+    Paper {
+        key: "yan2018",
+        citation: "Y. Yan, D. Letscher, T. Ju (2018): Voxel cores: efficient, robust, and provably good approximation of 3D medial axes. ACM Transactions on Graphics 37(4).",
+        doi: "10.1145/3197517.3201396",
+        stages: &["medial"],
+        used_for: "a medial axis with the topology of the voxel solid",
+    },
+    Paper {
+        key: "dey1999",
+        citation: "T. K. Dey, H. Edelsbrunner, S. Guha, D. V. Nekhayev (1999): Topology preserving edge contraction. Publications de l'Institut Mathématique (Beograd) 66.",
+        doi: "",
+        stages: &["skeleton"],
+        used_for: "the link condition: contractions that keep the topology",
+    },
+    Paper {
+        key: "wang2008",
+        citation: "W. Wang, B. Jüttler, D. Zheng, Y. Liu (2008): Computation of rotation minimizing frames. ACM Transactions on Graphics 27(1).",
+        doi: "10.1145/1330511.1330513",
+        stages: &["thicken"],
+        used_for: "beams without twist",
+    },
+    Paper {
+        key: "catmull1978",
+        citation: "E. Catmull, J. Clark (1978): Recursively generated B-spline surfaces on arbitrary topological meshes. Computer-Aided Design 10(6).",
+        doi: "10.1016/0010-4485(78)90110-0",
+        stages: &["fit"],
+        used_for: "the surface of a quad control mesh",
+    },
+    Paper {
+        key: "halstead1993",
+        citation: "M. Halstead, M. Kass, T. DeRose (1993): Efficient, fair interpolation using Catmull-Clark surfaces. SIGGRAPH.",
+        doi: "10.1145/166117.166121",
+        stages: &["fit"],
+        used_for: "fitting the limit surface with a fairness term",
+    },
+    Paper {
+        key: "loop2008",
+        citation: "C. Loop, S. Schaefer (2008): Approximating Catmull-Clark subdivision surfaces with bicubic patches. ACM Transactions on Graphics 27(1).",
+        doi: "10.1145/1330511.1330519",
+        stages: &["spline"],
+        used_for: "first and second order data of the patches",
+    },
+    Paper {
+        key: "eppstein2008",
+        citation: "D. Eppstein, M. T. Goodrich, E. Kim, R. Tamstorf (2008): Motorcycle graphs: canonical quad mesh partitioning. Computer Graphics Forum 27(5).",
+        doi: "10.1111/j.1467-8659.2008.01288.x",
+        stages: &["spline"],
+        used_for: "few large faces from many patches",
+    },
+];
+
+/// The papers behind `stages`, in the order of [`ALL`].
+pub fn of_stages<'a>(stages: impl IntoIterator<Item = &'a str>) -> Vec<&'static Paper> {
+    let names: Vec<&str> = stages.into_iter().collect();
+    ALL.iter().filter(|paper| paper.stages.iter().any(|stage| names.contains(stage))).collect()
+}
+
+/// The paper with `key`.
+pub fn find(key: &str) -> Option<&'static Paper> {
+    ALL.iter().find(|paper| paper.key == key)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn table_and_bibliography_agree() {
+        let bib = include_str!("../../../references.bib");
+        let entries = bib.lines().filter(|line| line.starts_with('@')).count();
+        assert_eq!(entries, ALL.len());
+        for paper in ALL {
+            assert!(bib.contains(&format!("{{{},", paper.key)), "{} is missing", paper.key);
+            assert!(paper.doi.is_empty() || bib.contains(&format!("{{{}}}", paper.doi)), "{}", paper.doi);
+        }
+    }
+
+    #[test]
+    fn stages_pick_their_papers() {
+        let keys: Vec<&str> = of_stages(["spline"]).iter().map(|paper| paper.key).collect();
+        assert_eq!(keys, ["loop2008", "eppstein2008"]);
+        assert!(find("yan2018").is_some() && find("nobody").is_none());
+    }
+}
