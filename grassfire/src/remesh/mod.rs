@@ -185,7 +185,7 @@ fn remesh_on(mesh: &TriMesh, source: Option<f64>, options: &RemeshOptions, monit
         return Err(not_solid(&bvh, &field));
     }
     monitor.step(STAGE, "smoothing", 0.55)?;
-    smooth::gauss(&mut field, options.smoothing);
+    smooth::smooth(&mut field, options.smoothing);
     let width = options.min_tunnel * source.unwrap_or(voxel);
     let mut noise = noise::remove_noise(&mut field, width, &options.keep_open, monitor)?;
     let mut set = VoxelSet::positive(field.dims, &field.values);

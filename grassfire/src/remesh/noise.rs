@@ -1,6 +1,6 @@
 //! Topological noise: small islands, cavities, tunnels and bridges, found, named and removed.
 
-use std::collections::VecDeque;
+use std::collections::{HashSet, VecDeque};
 
 use super::digital::{VoxelSet, delta_chi, is_simple};
 use super::options::Capsule;
@@ -33,8 +33,9 @@ pub(super) struct Outcome {
 ///    points, so what is left over carries exactly the topology that growing has changed: a membrane across the
 ///    narrowest place of every closed tunnel, an arc across every gap. Membranes that lower the first Betti number and
 ///    enclose nothing are inserted as plates as thick as the wall around them; nothing else is.
-/// 3. Bridges: the same on the empty side. A cut is made only when the bridge joins two places thicker than `width`
-///    that lie no more than `width` apart, and when the solid stays in one piece.
+/// 3. Bridges: the same on the empty side. A cut is made only through what is thinner than `width / 2`, joins two places
+///    at least twice as thick that lie no more than `width` apart, and whose loss leaves the solid in one piece:
+///    members, waists and webs are never cut.
 /// 4. Repeat until nothing changes.
 ///
 /// Voxels inside the capsules of `keep_open` are never filled or cut.
@@ -337,49 +338,45 @@ impl Queue {
     }
 }
 
-/// Length (mm) of the thin part between the two places thicker than `width` that the cut `voxels` separates locally;
-/// `None` when it does not lie between two such places nearby: then it is a member, not noise.
+/// Length (mm) of the thin part that the cut `voxels` goes through, between the two places at least twice as thick as
+/// the cut is; `None` when there are no such places nearby or the cut is thicker than `width / 2` or longer across than
+/// `width`: then it is a waist, a web or a member, not noise.
 fn bridge_length(grid: &VoxelGrid<f32>, set: &VoxelSet, voxels: &[u32], width: f64) -> Option<f64> {
-    let limit = (width / grid.spacing * 2.0).ceil() as i64 + 1;
-    if voxels.len() as i64 > limit * limit {
+    let cut = Patch::new(grid, voxels.to_vec());
+    let at = |v: u32| {
+        let [i, j, k] = set.ijk(v);
+        grid.centre(i, j, k)
+    };
+    if cut.width > width / 2.0 || voxels.iter().any(|&v| (at(v) - cut.place).norm() > width / 2.0) {
         return None;
     }
-    let centre = Patch::new(grid, voxels.to_vec()).place;
     let six = set.neighbours_6();
-    let near = |v: u32| {
-        let [i, j, k] = set.ijk(v);
-        (grid.centre(i, j, k) - centre).norm() <= 1.5 * width + grid.spacing
-    };
-    let mut seen: Vec<u32> = voxels.to_vec();
+    let mut seen: HashSet<u32> = voxels.iter().copied().collect();
     let mut lengths = Vec::new();
     for &seed in voxels {
         for s in &six {
             let start = (seed as isize + s) as u32;
-            if !set.solid[start as usize] || seen.binary_search(&start).is_ok() {
+            if !set.solid[start as usize] || !seen.insert(start) {
                 continue;
             }
             // One side of the cut, within reach.
             let mut side = vec![start];
-            let mut known = std::collections::HashSet::from([start]);
-            let mut at = 0;
+            let mut next = 0;
             let mut nearest = f64::INFINITY;
-            while at < side.len() {
-                let v = side[at];
-                at += 1;
-                if f64::from(grid.values[v as usize]) >= width / 2.0 {
-                    let [i, j, k] = set.ijk(v);
-                    nearest = nearest.min((grid.centre(i, j, k) - centre).norm());
+            while let Some(&v) = side.get(next) {
+                next += 1;
+                let depth = f64::from(grid.values[v as usize]);
+                if depth >= cut.width {
+                    nearest = nearest.min(((at(v) - cut.place).norm() - depth).max(0.0));
                 }
                 for s in &six {
                     let n = (v as isize + s) as u32;
-                    if set.solid[n as usize] && voxels.binary_search(&n).is_err() && near(n) && known.insert(n) {
+                    if set.solid[n as usize] && (at(n) - cut.place).norm() <= 2.0 * width && seen.insert(n) {
                         side.push(n);
                     }
                 }
             }
-            seen.extend(side);
-            seen.sort_unstable();
-            lengths.push((nearest - width / 2.0).max(0.0));
+            lengths.push(nearest);
         }
     }
     lengths.sort_by(f64::total_cmp);

@@ -13,17 +13,19 @@ const MARGIN: usize = 4;
 /// Rays for the wall thickness.
 const RAYS: usize = 4000;
 /// Share of the walls that may be thinner than the thickness the voxel is chosen from.
-const THIN_SHARE: f64 = 0.15;
-/// Voxels that wall of low-percentile thickness gets.
-const ACROSS: f64 = 4.5;
-/// Voxels along the longest side of the box: never fewer, and never more for the sake of thin walls.
-const LONGEST: [f64; 2] = [60.0, 300.0];
+const THIN_SHARE: f64 = 0.1;
+/// Voxels across such a wall: wanted, and needed even when the grid becomes larger than wanted.
+const ACROSS: [f64; 2] = [6.0, 2.25];
+/// Voxels along the longest side of the box: at least, wanted at most, at most for the sake of thin walls.
+const LONGEST: [f64; 3] = [60.0, 200.0, 400.0];
 
-/// The voxel edge (mm) that is used when none is asked for:
+/// The voxel edge (mm) that is used when none is asked for.
 ///
-/// `min(mean edge, thickness / 4.5)`, held between 1/300 and 1/60 of the longest side of the box and coarse enough for
-/// `max_voxels`. `thickness` is the 15th percentile of the wall thickness: inward rays from 4000 points spread over
-/// the surface to the opposite wall, where that is within 60 degrees of parallel.
+/// 1. `thickness`: 10th percentile of the wall thickness, from inward rays at 4000 points spread over the surface to
+///    the opposite wall, where that is within 60 degrees of parallel.
+/// 2. `min(mean edge, thickness / 6)`, but no finer than 1/200 of the longest side of the box unless thinner walls
+///    would get fewer than 2.25 voxels, and then no finer than 1/400.
+/// 3. No coarser than 1/60 of the longest side; coarser again when `max_voxels` demands it.
 pub fn default_voxel(mesh: &TriMesh, options: &RemeshOptions) -> f64 {
     voxel_for(mesh, &Bvh::new(mesh), options)
 }
@@ -31,8 +33,10 @@ pub fn default_voxel(mesh: &TriMesh, options: &RemeshOptions) -> f64 {
 pub(super) fn voxel_for(mesh: &TriMesh, bvh: &Bvh, options: &RemeshOptions) -> f64 {
     let (lo, hi) = bvh.bounds().unwrap_or_default();
     let longest = (hi - lo).max();
-    let wanted = mean_edge(mesh).min(wall_thickness(mesh, bvh).map_or(f64::INFINITY, |t| t / ACROSS));
-    let mut voxel = wanted.clamp(longest / LONGEST[1], longest / LONGEST[0]);
+    let thickness = wall_thickness(mesh, bvh).unwrap_or(f64::INFINITY);
+    let wanted = mean_edge(mesh).min(thickness / ACROSS[0]).max(longest / LONGEST[1]);
+    let needed = wanted.min(thickness / ACROSS[1]).max(longest / LONGEST[2]);
+    let mut voxel = needed.min(longest / LONGEST[0]);
     for _ in 0..64 {
         if voxel_count(&lo, &hi, voxel) <= options.max_voxels as f64 {
             break;
@@ -103,39 +107,82 @@ pub(super) fn layout(lo: &Vec3, hi: &Vec3, voxel: f64, max_voxels: usize) -> Res
 
 /// The spacing of the lattice that a marching-cubes mesh was made on, mm; `None` for other meshes.
 ///
-/// Such a mesh has two coordinates of every vertex on lattice planes. So along each axis the coordinates that many
-/// vertices share must be equally spaced, in multiples of one length, and must hold most vertices.
+/// Every vertex of such a mesh lies on a lattice line: two of its coordinates are multiples of the spacing, up to a
+/// shift. Spacings around the mean edge length are tried on 400 vertices; the shift of each axis is the fullest of 25
+/// classes of the remainder. Nine vertices of ten must fit, of other meshes one of twenty does.
 pub(super) fn source_lattice(mesh: &TriMesh) -> Option<f64> {
+    const CLASSES: usize = 25;
     let edge = mean_edge(mesh);
-    if mesh.triangles.len() < 200 || edge.is_nan() || edge <= 0.0 {
+    let (lo, hi) = mesh.bounds()?;
+    let longest = (hi - lo).max();
+    if mesh.triangles.len() < 200 || edge.is_nan() || edge <= 0.0 || longest > 5000.0 * edge {
         return None;
     }
-    let mut gap = f64::INFINITY;
-    for axis in 0..3 {
-        gap = gap.min(lattice_gap(mesh, axis, edge)?);
+    let used: Vec<u32> = mesh.triangles.iter().map(|t| t[0]).collect();
+    let step = (used.len() / 400).max(1);
+    let points: Vec<Vec3> = used.iter().step_by(step).map(|&v| mesh.points[v as usize] - lo).collect();
+    let fit = |spacing: f64| {
+        let mut on_plane = vec![0u8; points.len()];
+        for axis in 0..3 {
+            let class = |p: &Vec3| ((p[axis] / spacing).rem_euclid(1.0) * CLASSES as f64) as usize % CLASSES;
+            let mut counts = [0usize; CLASSES];
+            points.iter().for_each(|p| counts[class(p)] += 1);
+            let around = |c: usize| counts[c] + counts[(c + 1) % CLASSES] + counts[(c + CLASSES - 1) % CLASSES];
+            let best = (0..CLASSES).max_by_key(|&c| (around(c), counts[c], CLASSES - c)).unwrap_or(0);
+            for (p, n) in points.iter().zip(&mut on_plane) {
+                *n += u8::from((class(p) + CLASSES + 1 - best) % CLASSES <= 2);
+            }
+        }
+        on_plane.iter().filter(|&&n| n >= 2).count()
+    };
+    // A step moves the last lattice plane by 2 % of the spacing.
+    let count = (0.8 * longest / (0.02 * edge)).ceil() as usize;
+    let spacings: Vec<f64> = (0..=count).map(|i| edge * (0.7 + 0.7 * i as f64 / count as f64)).collect();
+    let fits: Vec<usize> = spacings.par_iter().map(|&s| fit(s)).collect();
+    let best = fits.iter().copied().max()?;
+    if best * 10 < points.len() * 9 {
+        return None;
     }
-    // Crossings half-way between two planes are common: the step is the multiple nearest to the mean edge length.
-    Some(gap * (edge / gap).round().max(1.0))
+    let good: Vec<f64> = spacings.iter().zip(&fits).filter(|(_, f)| **f == best).map(|(s, _)| *s).collect();
+    Some(good[good.len() / 2])
 }
 
-fn lattice_gap(mesh: &TriMesh, axis: usize, edge: f64) -> Option<f64> {
-    let mut x: Vec<f64> = mesh.points.iter().map(|p| p[axis]).filter(|x| x.is_finite()).collect();
-    x.sort_by(f64::total_cmp);
-    let crowd = (x.len() / 2000).max(8);
-    let mut planes = Vec::new();
-    let mut held = 0;
-    for group in x.chunk_by(|a, b| b - a < 2e-3 * edge) {
-        if group.len() >= crowd {
-            held += group.len();
-            planes.push(group.iter().sum::<f64>() / group.len() as f64);
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::remesh::tests::cube;
+
+    #[test]
+    fn a_cube_gets_sixty_voxels_and_a_plate_enough() {
+        let mesh = cube(10.0);
+        assert!((default_voxel(&mesh, &RemeshOptions::default()) - 10.0 / 60.0).abs() < 1e-12);
+        let mut plate = cube(100.0);
+        plate.points.iter_mut().for_each(|p| p.z *= 0.01);
+        let voxel = default_voxel(&plate, &RemeshOptions::default());
+        assert!((voxel - 1.0 / 2.25).abs() < 1e-3, "{voxel}");
+        let few = RemeshOptions { max_voxels: 10_000, ..RemeshOptions::default() };
+        let voxel = default_voxel(&plate, &few);
+        let (lo, hi) = plate.bounds().unwrap_or_default();
+        assert!(layout(&lo, &hi, voxel, few.max_voxels).is_ok());
+    }
+
+    #[test]
+    fn lattices_are_recognised() {
+        let mut grid = crate::voxel::VoxelGrid::filled(Vec3::repeat(0.3), 1.5, [24; 3], 0f32);
+        for v in 0..grid.values.len() {
+            let [i, j, k] = grid.ijk(v);
+            grid.values[v] = 9.0 - (grid.centre(i, j, k) - Vec3::new(17.0, 17.3, 17.9)).norm() as f32;
         }
+        let set = crate::remesh::digital::VoxelSet::positive(grid.dims, &grid.values);
+        // Marching cubes puts its vertices on the lattice lines; move the dual vertices there.
+        let mut mesh = crate::remesh::extract::surface(&grid, &set, false).mesh;
+        assert_eq!(source_lattice(&mesh), None);
+        for (n, p) in mesh.points.iter_mut().enumerate() {
+            for a in (0..3).filter(|a| *a != n % 3) {
+                p[a] = 0.3 + 1.5 * ((p[a] - 0.3) / 1.5).round();
+            }
+        }
+        let found = source_lattice(&mesh).expect("a lattice");
+        assert!((found - 1.5).abs() < 0.03, "{found}");
     }
-    if planes.len() < 6 || held * 2 < x.len() {
-        return None;
-    }
-    let mut gaps: Vec<f64> = planes.windows(2).map(|w| w[1] - w[0]).collect();
-    gaps.sort_by(f64::total_cmp);
-    let gap = gaps[gaps.len() / 4];
-    let regular = gaps.iter().filter(|&&g| (g / gap - (g / gap).round()).abs() < 0.03).count();
-    (gap > 0.2 * edge && regular * 10 >= gaps.len() * 9).then_some(gap)
 }

@@ -1,4 +1,4 @@
-//! Separable Gaussian filter.
+//! Gaussian filter without shrinkage.
 
 use rayon::prelude::*;
 
@@ -12,12 +12,24 @@ pub(super) fn weights(sigma: f64) -> Vec<f32> {
     raw.iter().map(|w| (w / sum) as f32).collect()
 }
 
-/// Convolves with a Gaussian of `sigma` voxels, along x, y and z in turn; the border value is continued outward.
-pub(super) fn gauss(grid: &mut VoxelGrid<f32>, sigma: f64) {
+/// Smooths with a Gaussian of `sigma` voxels whose bias is taken out: `G f + G (f - G f)`.
+///
+/// A plain Gaussian pulls the surface off convex edges and thin walls (2-4 % of a bracket's volume); the second pass
+/// gives back what the first one took except for the noise. The border value is continued outward.
+pub(super) fn smooth(grid: &mut VoxelGrid<f32>, sigma: f64) {
     if sigma <= 0.0 {
         return;
     }
     let weights = weights(sigma);
+    let mut rest = grid.clone();
+    convolve(grid, &weights);
+    rest.values.par_iter_mut().zip(&grid.values).for_each(|(r, v)| *r -= v);
+    convolve(&mut rest, &weights);
+    grid.values.par_iter_mut().zip(&rest.values).for_each(|(v, r)| *v += r);
+}
+
+/// Convolves along x, y and z in turn.
+fn convolve(grid: &mut VoxelGrid<f32>, weights: &[f32]) {
     let [nx, ny, nz] = grid.dims;
     for (length, stride) in [(nx, 1), (ny, nx), (nz, nx * ny)] {
         let source = std::mem::take(&mut grid.values);
@@ -50,13 +62,13 @@ mod tests {
         for v in 0..grid.values.len() {
             grid.values[v] = grid.ijk(v)[0] as f32;
         }
-        gauss(&mut grid, 0.7);
+        smooth(&mut grid, 0.7);
         assert!((grid.values[grid.index(10, 4, 4)] - 10.0).abs() < 1e-5);
         grid.values.fill(0.0);
         let middle = grid.index(10, 4, 4);
         grid.values[middle] = 1.0;
-        gauss(&mut grid, 0.7);
+        smooth(&mut grid, 0.7);
         assert!((grid.values.iter().sum::<f32>() - 1.0).abs() < 1e-5);
-        assert!(grid.values[middle] > grid.values[middle + 1] && grid.values[middle + 1] > 0.0);
+        assert!(grid.values[middle] > grid.values[middle + 1] && grid.values[middle] < 0.6);
     }
 }
