@@ -304,3 +304,71 @@ fn best_split(block: &Block, half_edges: &HalfEdges, cut: &[bool], meetings: &[[
     }
     best.map(|(_, _, _, axis, at)| (axis, at))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Vec3;
+    use crate::spline::motorcycle::cut_lines;
+
+    /// A grid of `m` x `n` quads closed in both directions, the second one with a shift.
+    fn torus(m: u32, n: u32, shift: u32) -> ControlMesh {
+        let at = |i: u32, j: u32| ((i + shift * (j / n)) % m) * n + j % n;
+        let points = (0..m * n).map(|k| Vec3::new(f64::from(k), 0.0, 0.0)).collect();
+        let quads = (0..m).flat_map(|i| (0..n).map(move |j| (i, j)));
+        let quads = quads.map(|(i, j)| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+        ControlMesh { points, quads: quads.collect() }
+    }
+
+    fn assert_simple(mesh: &ControlMesh, half_edges: &HalfEdges, blocks: &[Block]) {
+        let mut quads: Vec<u32> = blocks.iter().flat_map(|b| b.cells.iter().map(|c| c.quad)).collect();
+        quads.sort_unstable();
+        assert!(quads.into_iter().eq(0..mesh.quads.len() as u32));
+        for block in blocks {
+            assert_eq!(block.cells.len() as u32, block.spans[0] * block.spans[1]);
+            assert!(meetings(half_edges, block).is_empty());
+            for i in 0..block.spans[0] {
+                for j in 0..block.spans[1] {
+                    let right = half_edges.twin[block.cell(i, j).side(1) as usize];
+                    let above = half_edges.twin[block.cell(i, j).side(2) as usize];
+                    assert!(i + 1 == block.spans[0] || block.cell(i + 1, j).side(3) == right);
+                    assert!(j + 1 == block.spans[1] || block.cell(i, j + 1).side(0) == above);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn torus_without_extraordinary_points_gives_four_blocks() {
+        for (m, n, shift) in [(8, 6, 0), (3, 3, 0), (9, 7, 2), (12, 3, 5)] {
+            let mesh = torus(m, n, shift);
+            let half_edges = HalfEdges::new(&mesh).expect("a valid torus");
+            let mut cut = cut_lines(&half_edges);
+            let blocks = rectangular_blocks(&mesh, &half_edges, &mut cut).expect("rectangles");
+            assert_simple(&mesh, &half_edges, &blocks);
+            assert!(shift != 0 || blocks.len() <= 4, "{} blocks on {m} x {n}", blocks.len());
+        }
+    }
+
+    #[test]
+    fn rings_are_cut_across() {
+        let mesh = torus(8, 6, 0);
+        let half_edges = HalfEdges::new(&mesh).expect("a valid torus");
+        for loops in [vec![0], vec![0, 2], vec![0, 1, 5]] {
+            let mut cut = vec![false; half_edges.twin.len()];
+            for &at in &loops {
+                let start = (0..half_edges.len())
+                    .find(|&h| half_edges.origin[h as usize] == at && half_edges.target(h) == at + 6)
+                    .expect("an edge along the loop");
+                let mut h = start;
+                for _ in 0..8 {
+                    mark(&half_edges, &mut cut, h);
+                    h = half_edges.ahead(h);
+                }
+            }
+            let blocks = rectangular_blocks(&mesh, &half_edges, &mut cut).expect("rectangles");
+            assert_simple(&mesh, &half_edges, &blocks);
+            assert_eq!(blocks.len(), if loops.len() == 1 { 4 } else { 2 * loops.len() });
+        }
+    }
+}

@@ -209,7 +209,7 @@ mod tests {
     #[test]
     fn constants_agree_with_the_published_prototype() {
         for (n, scale, twist) in
-            [(3, 0.66779, 2.72774), (5, 1.11268, -0.52902), (6, 1.12840, -0.79552), (10, 0.96395, -1.14121)]
+            [(3, 0.66779, 2.72774), (5, 1.11268, -0.52902), (6, 1.12840, -0.79552), (10, 0.96395, -1.14111)]
         {
             let constants = Constants::new(n, 0.3);
             let valence = f64::from(n);

@@ -177,3 +177,68 @@ fn pair(mesh: &ControlMesh, origin: &[u32]) -> Result<Vec<u32>, SplineError> {
 fn middle(mesh: &ControlMesh, edge: [u32; 2]) -> Vec3 {
     (mesh.points[edge[0] as usize] + mesh.points[edge[1] as usize]) / 2.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cube() -> ControlMesh {
+        let points = (0..8).map(|k| Vec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))).collect();
+        let quads = vec![[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        ControlMesh { points, quads }
+    }
+
+    fn error(mesh: &ControlMesh) -> SplineError {
+        let error = HalfEdges::new(mesh).err().expect("an error");
+        assert!(error.hint().is_some(), "{error}");
+        error
+    }
+
+    #[test]
+    fn cube_is_connected() {
+        let half_edges = HalfEdges::new(&cube()).expect("a valid cube");
+        assert_eq!(half_edges.euler(), 2);
+        for h in 0..half_edges.len() {
+            assert_eq!(half_edges.twin[half_edges.twin[h as usize] as usize], h);
+            assert_eq!(half_edges.origin[half_edges.twin[h as usize] as usize], half_edges.target(h));
+            assert_eq!(half_edges.ring(half_edges.origin[h as usize]).count(), 3);
+        }
+    }
+
+    #[test]
+    fn bad_meshes_are_named() {
+        assert_eq!(error(&ControlMesh::default()), SplineError::Empty);
+        let mut mesh = cube();
+        mesh.quads[3][2] = 9;
+        assert_eq!(error(&mesh), SplineError::MissingPoint { quad: 3, point: 9, points: 8 });
+        let mut mesh = cube();
+        mesh.points[5].y = f64::NAN;
+        assert_eq!(error(&mesh), SplineError::NotFinite { point: 5 });
+        let mut mesh = cube();
+        mesh.quads[2][1] = 0;
+        assert!(matches!(error(&mesh), SplineError::DegenerateQuad { quad: 2, point: 0, .. }));
+        let mut mesh = cube();
+        mesh.quads.pop();
+        assert!(matches!(error(&mesh), SplineError::OpenEdge { edge: [1, 3], quad: 0, count: 4, .. }));
+        let mut mesh = cube();
+        mesh.quads[0].reverse();
+        assert!(matches!(error(&mesh), SplineError::NonManifoldEdge { edge: [0, 1], count: 4, .. }));
+    }
+
+    #[test]
+    fn touching_cubes_are_pinched() {
+        let (mut mesh, mut other) = (cube(), cube());
+        other.points.iter_mut().for_each(|p| *p += Vec3::new(1.0, 1.0, 1.0));
+        other.quads.iter_mut().flatten().for_each(|v| *v = if *v == 0 { 7 } else { *v + 8 });
+        mesh.points.append(&mut other.points);
+        mesh.quads.append(&mut other.quads);
+        assert!(matches!(error(&mesh), SplineError::PinchedPoint { point: 7, count: 1, .. }));
+    }
+
+    #[test]
+    fn two_quads_around_a_point_are_refused() {
+        let points = (0..4).map(|k| Vec3::new(f64::from(k & 1), f64::from(k >> 1), 0.0)).collect();
+        let pillow = ControlMesh { points, quads: vec![[0, 1, 3, 2], [0, 2, 3, 1]] };
+        assert!(matches!(error(&pillow), SplineError::Valence { point: 0, valence: 2, count: 4, .. }));
+    }
+}

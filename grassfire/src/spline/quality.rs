@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::half_edges::HalfEdges;
-use super::{ControlMesh, Patch, SplineError, evaluate};
+use super::{ControlMesh, Patch, SplineError, SurfacePoint, evaluate};
 use crate::Vec3;
 
 /// Largest kink and gap between neighbouring patches.
@@ -84,8 +84,8 @@ fn edge_report(patches: &[Patch], h: u32, g: u32) -> G1Report {
 /// The place where the patches are closest to folding over.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FoldReport {
-    /// Smallest normalised Jacobian: sine of the angle between the derivatives, times the cosine between the normal and
-    /// the blend of the four corner normals. Negative where the patch folds over.
+    /// Smallest normalised Jacobian: sine of the angle between the derivatives, times the cosine between the normals
+    /// of this and the next sample. Zero where the patch is singular, negative where its normal flips over.
     pub value: f64,
     /// The quad.
     pub quad: u32,
@@ -95,9 +95,9 @@ pub struct FoldReport {
     pub count: usize,
 }
 
-const FOLD_SAMPLES: usize = 7;
+const FOLD_SAMPLES: usize = 9;
 
-/// Finds the smallest normalised Jacobian on a 7 x 7 grid a patch; `None` without patches.
+/// Finds the smallest normalised Jacobian on a 9 x 9 grid a patch, corners included; `None` without patches.
 pub fn worst_fold(patches: &[Patch], limit: f64) -> Option<FoldReport> {
     let all: Vec<(f64, Vec3)> = patches.par_iter().map(smallest_jacobian).collect();
     let count = all.iter().filter(|(value, _)| *value < limit).count();
@@ -106,18 +106,20 @@ pub fn worst_fold(patches: &[Patch], limit: f64) -> Option<FoldReport> {
 }
 
 fn smallest_jacobian(patch: &Patch) -> (f64, Vec3) {
-    let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|[u, v]| evaluate(patch, u, v).normal);
+    let samples: [[SurfacePoint; FOLD_SAMPLES]; FOLD_SAMPLES] = std::array::from_fn(|i| {
+        std::array::from_fn(|j| {
+            let [u, v] = [i, j].map(|k| k as f64 / (FOLD_SAMPLES - 1) as f64);
+            evaluate(patch, u, v)
+        })
+    });
     let mut worst = (f64::INFINITY, Vec3::zeros());
     for i in 0..FOLD_SAMPLES {
         for j in 0..FOLD_SAMPLES {
-            let [u, v] = [i, j].map(|k| k as f64 / (FOLD_SAMPLES - 1) as f64);
-            let reference = (corners[0] * (1.0 - u) + corners[1] * u) * (1.0 - v)
-                + (corners[2] * (1.0 - u) + corners[3] * u) * v;
-            let reference = reference.try_normalize(1e-9).unwrap_or_default();
-            let point = evaluate(patch, u, v);
+            let point = &samples[i][j];
             let lengths = point.du.norm() * point.dv.norm();
-            let jacobian = point.du.cross(&point.dv).dot(&reference);
-            let value = if lengths > 0.0 { jacobian / lengths } else { 0.0 };
+            let sine = if lengths > 0.0 { point.du.cross(&point.dv).norm() / lengths } else { 0.0 };
+            let after = [&samples[(i + 1).min(FOLD_SAMPLES - 1)][j], &samples[i][(j + 1).min(FOLD_SAMPLES - 1)]];
+            let value = after.iter().map(|p| sine * p.normal.dot(&point.normal)).fold(sine, f64::min);
             if value < worst.0 {
                 worst = (value, point.position);
             }
