@@ -1,7 +1,11 @@
 //! Triangle meshes: the soup that files hold, and the validated closed solid.
 
+mod repair;
 mod solid;
 
+pub use repair::{
+    Repair, RepairError, RepairKind, RepairOptions, RepairReport, Repaired, repair,
+};
 pub use solid::{Solid, SolidError};
 
 use crate::Vec3;
