@@ -1,0 +1,390 @@
+//! PLY (Stanford polygon file): text and both binary orders.
+
+use super::IoError;
+use super::obj::fan;
+use super::source::{Source, quote, tokens};
+use crate::Vec3;
+use crate::mesh::{Repair, RepairKind, TriMesh};
+
+/// Most properties over all elements; real files have a few dozen.
+const MAX_PROPERTIES: usize = 1000;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Encoding {
+    Text,
+    Little,
+    Big,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Kind {
+    fn parse(word: &[u8]) -> Option<Self> {
+        Some(match word {
+            b"char" | b"int8" => Self::I8,
+            b"uchar" | b"uint8" => Self::U8,
+            b"short" | b"int16" => Self::I16,
+            b"ushort" | b"uint16" => Self::U16,
+            b"int" | b"int32" => Self::I32,
+            b"uint" | b"uint32" => Self::U32,
+            b"float" | b"float32" => Self::F32,
+            b"double" | b"float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    /// `bytes` holds exactly [`Kind::size`] bytes.
+    fn decode(self, bytes: &[u8], big: bool) -> f64 {
+        let mut b = [0u8; 8];
+        for (slot, &byte) in b.iter_mut().zip(bytes) {
+            *slot = byte;
+        }
+        if big {
+            b[..self.size()].reverse();
+        }
+        let word = u32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+        match self {
+            Self::I8 => f64::from(b[0] as i8),
+            Self::U8 => f64::from(b[0]),
+            Self::I16 => f64::from(word as u16 as i16),
+            Self::U16 => f64::from(word as u16),
+            Self::I32 => f64::from(word as i32),
+            Self::U32 => f64::from(word),
+            Self::F32 => f64::from(f32::from_bits(word)),
+            Self::F64 => f64::from_le_bytes(b),
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Property {
+    name: String,
+    kind: Kind,
+    /// Kind of the length of a list; `None` for one value.
+    list: Option<Kind>,
+}
+
+#[derive(Debug)]
+struct Header {
+    encoding: Encoding,
+    /// Name, number of rows and properties.
+    elements: Vec<(String, usize, Vec<Property>)>,
+    /// Where the rows begin, in bytes and in lines.
+    body: usize,
+    lines: usize,
+}
+
+/// One property of all rows of an element: single values have `ends` empty.
+#[derive(Debug, Default)]
+pub(super) struct Column {
+    pub values: Vec<f64>,
+    pub ends: Vec<usize>,
+}
+
+/// The wanted columns of one element.
+#[derive(Debug)]
+pub(super) struct Table {
+    pub name: String,
+    pub rows: usize,
+    pub columns: Vec<(String, Column)>,
+}
+
+impl Table {
+    pub fn column(&self, name: &str) -> Option<&Column> {
+        self.columns.iter().find(|(n, _)| n == name).map(|(_, c)| c)
+    }
+
+    /// The column of corner indices, under either of its two names.
+    pub fn corners(&self) -> Option<&Column> {
+        self.column("vertex_indices").or_else(|| self.column("vertex_index")).filter(|c| c.ends.len() == self.rows)
+    }
+}
+
+impl Column {
+    /// The lists of a list column.
+    pub fn lists(&self) -> impl Iterator<Item = &[f64]> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        starts.zip(&self.ends).map(|(start, &end)| &self.values[start..end])
+    }
+}
+
+pub(super) fn read_mesh(src: &Source, notes: &mut Vec<Repair>) -> Result<TriMesh, IoError> {
+    let tables = read_tables(src, &|element, property| match element {
+        "vertex" => matches!(property, "x" | "y" | "z"),
+        "face" => matches!(property, "vertex_indices" | "vertex_index"),
+        _ => false,
+    })?;
+    let points = points(src, &tables)?;
+    let Some(faces) = tables.iter().find(|t| t.name == "face") else {
+        return Err(IoError::Empty { file: src.file(), what: "points without faces" });
+    };
+    let corners = faces.corners().ok_or_else(|| src.format("the faces have no list `vertex_indices`"))?;
+    let mut mesh = TriMesh { points, ..TriMesh::default() };
+    let mut flat = 0;
+    let mut polygon = Vec::new();
+    for (index, list) in corners.lists().enumerate() {
+        corner_indices(src, "face", index, list, mesh.points.len(), &mut polygon)?;
+        flat += usize::from(polygon.len() < 3);
+        fan(&polygon, &mut mesh.triangles);
+        src.check_triangles(mesh.triangles.len())?;
+    }
+    if flat > 0 {
+        let text = format!("{flat} faces with fewer than 3 corners ignored");
+        notes.push(Repair::new(RepairKind::Skipped, flat, text));
+    }
+    Ok(mesh)
+}
+
+/// The points of element `vertex`.
+pub(super) fn points(src: &Source, tables: &[Table]) -> Result<Vec<Vec3>, IoError> {
+    let vertices = tables.iter().find(|t| t.name == "vertex").ok_or_else(|| src.format("there is no element `vertex`"))?;
+    let axis = |name: &str| {
+        let column = vertices.column(name).filter(|c| c.values.len() == vertices.rows);
+        column.ok_or_else(|| src.format(format!("the vertices have no property `{name}`")))
+    };
+    let (x, y, z) = (axis("x")?, axis("y")?, axis("z")?);
+    let zipped = x.values.iter().zip(&y.values).zip(&z.values);
+    Ok(zipped.map(|((&x, &y), &z)| Vec3::new(x, y, z)).collect())
+}
+
+/// Checks that `list` holds indices of points and puts them into `out`.
+pub(super) fn corner_indices(
+    src: &Source,
+    element: &'static str,
+    index: usize,
+    list: &[f64],
+    points: usize,
+    out: &mut Vec<u32>,
+) -> Result<(), IoError> {
+    out.clear();
+    for &value in list {
+        if !(value >= 0.0 && value < points as f64 && value.fract() == 0.0) {
+            return Err(src.element(element, index, format!("names point {value}, there are {points} (counted from 0)")));
+        }
+        out.push(value as u32);
+    }
+    Ok(())
+}
+
+/// Reads the columns that `keep(element, property)` asks for.
+pub(super) fn read_tables(src: &Source, keep: &dyn Fn(&str, &str) -> bool) -> Result<Vec<Table>, IoError> {
+    let header = read_header(src)?;
+    let mut rest = Body { bytes: &src.bytes[header.body..], at: 0, line: header.lines };
+    let mut tables = Vec::new();
+    for (name, rows, properties) in &header.elements {
+        check_rows(src, &header, rest.bytes.len() - rest.at, name, *rows, properties)?;
+        let wanted: Vec<bool> = properties.iter().map(|p| keep(name, &p.name)).collect();
+        let mut columns: Vec<Column> = properties.iter().map(|_| Column::default()).collect();
+        for row in 0..*rows {
+            if row % 100_000 == 0 {
+                src.monitor.check()?;
+            }
+            match header.encoding {
+                Encoding::Text => rest.text_row(src, name, row, *rows, properties, &wanted, &mut columns)?,
+                order => rest.binary_row(src, &header, order == Encoding::Big, (name, row, *rows), properties, &wanted, &mut columns)?,
+            }
+        }
+        let named = properties.iter().map(|p| p.name.clone()).zip(columns);
+        let columns = named.zip(&wanted).filter(|(_, wanted)| **wanted).map(|(column, _)| column).collect();
+        tables.push(Table { name: name.clone(), rows: *rows, columns });
+    }
+    Ok(tables)
+}
+
+fn read_header(src: &Source) -> Result<Header, IoError> {
+    let mut header = Header { encoding: Encoding::Text, elements: Vec::new(), body: 0, lines: 0 };
+    let (mut seen_format, mut properties) = (false, 0);
+    while let Some(length) = src.bytes[header.body..].iter().position(|&b| b == b'\n') {
+        let line = &src.bytes[header.body..header.body + length];
+        header.body += length + 1;
+        header.lines += 1;
+        let n = header.lines;
+        let mut words = tokens(line);
+        match words.next().unwrap_or_default() {
+            b"end_header" if seen_format => return Ok(header),
+            b"end_header" => return Err(src.line(n, "the header has no line `format`")),
+            b"format" => {
+                seen_format = true;
+                header.encoding = match words.next().unwrap_or_default() {
+                    b"ascii" => Encoding::Text,
+                    b"binary_little_endian" => Encoding::Little,
+                    b"binary_big_endian" => Encoding::Big,
+                    other => return Err(src.line(n, format!("format {} is not known", quote(other)))),
+                };
+            }
+            b"element" => {
+                let name = words.next().unwrap_or_default();
+                let rows = src.next_index(n, &mut words, "the number of rows")?;
+                header.elements.push((String::from_utf8_lossy(name).into_owned(), rows, Vec::new()));
+            }
+            b"property" => {
+                let Some((_, _, list)) = header.elements.last_mut() else {
+                    return Err(src.line(n, "a property before the first element"));
+                };
+                list.push(read_property(src, n, words)?);
+                properties += 1;
+            }
+            b"ply" | b"comment" | b"obj_info" | b"" => {}
+            other => return Err(src.line(n, format!("{} is not a PLY header line", quote(other)))),
+        }
+        if properties > MAX_PROPERTIES || header.elements.len() > MAX_PROPERTIES {
+            return Err(src.limit("the number of properties", properties.max(header.elements.len()), MAX_PROPERTIES));
+        }
+    }
+    Err(src.line(header.lines + 1, "the file ends inside the header: `end_header` is missing"))
+}
+
+fn read_property<'t>(src: &Source, line: usize, mut words: impl Iterator<Item = &'t [u8]>) -> Result<Property, IoError> {
+    let kind = |word: Option<&[u8]>| {
+        let word = word.unwrap_or_default();
+        Kind::parse(word).ok_or_else(|| src.line(line, format!("{} is not a PLY type", quote(word))))
+    };
+    let first = words.next().unwrap_or_default();
+    let (list, kind) = if first == b"list" {
+        (Some(kind(words.next())?), kind(words.next())?)
+    } else {
+        (None, kind(Some(first))?)
+    };
+    let name = words.next().ok_or_else(|| src.line(line, "the property has no name"))?;
+    Ok(Property { name: String::from_utf8_lossy(name).into_owned(), kind, list })
+}
+
+/// Refuses a number of rows that cannot fit into the bytes that are left.
+fn check_rows(src: &Source, header: &Header, left: usize, name: &str, rows: usize, properties: &[Property]) -> Result<(), IoError> {
+    let least = match header.encoding {
+        Encoding::Text => 2 * properties.len(),
+        _ => properties.iter().map(|p| p.list.unwrap_or(p.kind).size()).sum(),
+    };
+    // The last line of a text may lack its end.
+    if rows > 0 && (least == 0 || rows.saturating_mul(least) > left + 1) {
+        let name = quote(name.as_bytes());
+        return Err(src.format(format!("{rows} rows of element {name} do not fit into the {left} bytes left")));
+    }
+    Ok(())
+}
+
+/// The rows, read from front to back.
+struct Body<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    line: usize,
+}
+
+impl<'a> Body<'a> {
+    fn next_line(&mut self) -> Option<&'a [u8]> {
+        while self.at < self.bytes.len() {
+            let rest = &self.bytes[self.at..];
+            let length = rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len());
+            self.at = (self.at + length + 1).min(self.bytes.len());
+            self.line += 1;
+            let line = rest[..length].trim_ascii();
+            if !line.is_empty() {
+                return Some(line);
+            }
+        }
+        None
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn text_row(
+        &mut self,
+        src: &Source,
+        name: &str,
+        row: usize,
+        rows: usize,
+        properties: &[Property],
+        wanted: &[bool],
+        columns: &mut [Column],
+    ) -> Result<(), IoError> {
+        let Some(line) = self.next_line() else {
+            return Err(src.line(self.line, format!("the file ends at row {row} of {rows} of element {}", quote(name.as_bytes()))));
+        };
+        let mut words = tokens(line);
+        for ((property, &wanted), column) in properties.iter().zip(wanted).zip(columns) {
+            let count = match property.list {
+                Some(_) => src.next_index(self.line, &mut words, "the length of a list")?,
+                None => 1,
+            };
+            for _ in 0..count {
+                let Some(word) = words.next() else {
+                    let what = format!("too few values for row {row} of element {}", quote(name.as_bytes()));
+                    return Err(src.line(self.line, what));
+                };
+                if wanted {
+                    column.values.push(src.number(self.line, word)?);
+                }
+            }
+            if wanted && property.list.is_some() {
+                column.ends.push(column.values.len());
+            }
+        }
+        if words.next().is_some() {
+            return Err(src.line(self.line, format!("too many values for row {row} of element {}", quote(name.as_bytes()))));
+        }
+        Ok(())
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn binary_row(
+        &mut self,
+        src: &Source,
+        header: &Header,
+        big: bool,
+        (name, row, rows): (&str, usize, usize),
+        properties: &[Property],
+        wanted: &[bool],
+        columns: &mut [Column],
+    ) -> Result<(), IoError> {
+        let bytes = self.bytes;
+        let cut = || {
+            let what = format!("the file ends inside row {row} of {rows} of element {}", quote(name.as_bytes()));
+            src.byte(header.body + bytes.len(), what)
+        };
+        for ((property, &wanted), column) in properties.iter().zip(wanted).zip(columns) {
+            let count = match property.list {
+                Some(kind) => {
+                    let count = kind.decode(self.take(kind.size()).ok_or_else(cut)?, big);
+                    if !(count >= 0.0 && count.fract() == 0.0) {
+                        return Err(src.byte(header.body + self.at, format!("{count} is not a length of a list")));
+                    }
+                    count as usize
+                }
+                None => 1,
+            };
+            let size = property.kind.size();
+            let data = count.checked_mul(size).and_then(|n| self.take(n)).ok_or_else(cut)?;
+            if wanted {
+                column.values.extend(data.chunks_exact(size).map(|b| property.kind.decode(b, big)));
+                if property.list.is_some() {
+                    column.ends.push(column.values.len());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let data = self.bytes.get(self.at..self.at.checked_add(count)?)?;
+        self.at += count;
+        Some(data)
+    }
+}
