@@ -1,1 +1,50 @@
 //! CAD stage: B-rep -> OpenCASCADE solid, united with the non-design bodies, checked, written as STEP.
+//!
+//! 1. [`read`] (STEP) or [`from_mesh`] make exact [`NonDesignBody`]s and find their bores.
+//! 2. [`build`] makes the body's B-rep directly (shared edges, exact pcurves, no sewing), fuses the non-design bodies with
+//!    their bores filled, cuts the bores last, and checks every step with volumes that do not come from the CAD kernel.
+//! 3. [`write_step`] and [`tessellate`] give the files.
+//!
+//! Without the feature `occt` only the options, the error and the recognition of surfaces in meshes ([`primitives`]) are here.
+
+mod error;
+mod options;
+pub mod primitives;
+
+#[cfg(feature = "occt")]
+mod bores;
+#[cfg(feature = "occt")]
+mod build;
+#[cfg(feature = "occt")]
+mod inspect;
+#[cfg(feature = "occt")]
+mod non_design;
+#[cfg(feature = "occt")]
+mod output;
+#[cfg(feature = "occt")]
+mod patches;
+#[cfg(feature = "occt")]
+mod rays;
+#[cfg(feature = "occt")]
+mod rebuild;
+#[cfg(feature = "occt")]
+mod reference;
+#[cfg(feature = "occt")]
+mod shells;
+
+pub use error::CadError;
+pub use options::{CadOptions, NonDesignOptions, StepOptions};
+
+#[cfg(feature = "occt")]
+pub use {
+    bores::Bore,
+    build::{CadSolid, FaceSource, QuadsBrep, build},
+    inspect::NonDesignResult,
+    non_design::{NonDesignBody, Rebuilt, from_mesh, read},
+    output::{tessellate, write_step},
+};
+
+#[cfg(feature = "occt")]
+fn array(v: crate::Vec3) -> [f64; 3] {
+    v.into()
+}

@@ -1,0 +1,182 @@
+// STEP files and triangulation.
+#include "grassfire-occt/cpp/bridge.h"
+#include "grassfire-occt/src/ffi.rs.h"
+
+#include <map>
+#include <numeric>
+#include <stdexcept>
+
+#include <APIHeaderSection_MakeHeader.hxx>
+#include <BRepMesh_IncrementalMesh.hxx>
+#include <BRepTools.hxx>
+#include <BRep_Tool.hxx>
+#include <IFSelect_ReturnStatus.hxx>
+#include <Interface_Static.hxx>
+#include <Poly_PolygonOnTriangulation.hxx>
+#include <Poly_Triangulation.hxx>
+#include <STEPConstruct.hxx>
+#include <STEPControl_Controller.hxx>
+#include <STEPControl_Reader.hxx>
+#include <STEPControl_Writer.hxx>
+#include <StepData_StepModel.hxx>
+#include <StepRepr_RepresentationItem.hxx>
+#include <TCollection_HAsciiString.hxx>
+#include <TopExp.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopTools_IndexedMapOfShape.hxx>
+#include <Transfer_FinderProcess.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Edge.hxx>
+#include <TopoDS_Face.hxx>
+#include <TopoDS_Vertex.hxx>
+#include <XSControl_TransferWriter.hxx>
+#include <XSControl_WorkSession.hxx>
+
+namespace grassfire {
+namespace {
+
+Handle(TCollection_HAsciiString) text(const rust::String& s) { return new TCollection_HAsciiString(std::string(s).c_str()); }
+
+void name_items(const Handle(Transfer_FinderProcess)& finder, const TopoDS_Shape& shape, TopAbs_ShapeEnum type, const rust::Vec<rust::String>& names) {
+  TopTools_IndexedMapOfShape map;
+  TopExp::MapShapes(shape, type, map);
+  for (int i = 1; i <= map.Extent() && size_t(i) <= names.size(); ++i) {
+    if (names[size_t(i) - 1].empty()) continue;
+    const Handle(StepRepr_RepresentationItem) item = STEPConstruct::FindEntity(finder, map(i));
+    if (!item.IsNull()) item->SetName(text(names[size_t(i) - 1]));
+  }
+}
+
+void fill_header(const Handle(StepData_StepModel)& model, const StepNames& names) {
+  APIHeaderSection_MakeHeader header(model);
+  header.SetName(text(names.product));
+  header.SetAuthorValue(1, text(names.author));
+  header.SetOrganizationValue(1, text(names.organization));
+  header.SetOriginatingSystem(text(names.system));
+  header.SetAuthorisation(text(rust::String("")));
+  header.SetDescriptionValue(1, text(names.description));
+  if (!names.time_stamp.empty()) header.SetTimeStamp(text(names.time_stamp));
+}
+
+class UnionFind {
+ public:
+  explicit UnionFind(size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), size_t(0)); }
+  size_t find(size_t a) {
+    while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
+    return a;
+  }
+  void join(size_t a, size_t b) {
+    a = find(a), b = find(b);
+    if (a != b) parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<size_t> parent_;
+};
+
+// Joins the nodes of neighbouring faces: by position along a shared edge and by shared vertex, never by distance.
+void join_edges(const TopTools_IndexedMapOfShape& faces, const std::vector<size_t>& first_node, UnionFind& nodes) {
+  TopTools_IndexedMapOfShape edges, vertices;
+  std::map<std::pair<int, int>, size_t> edge_node;
+  std::map<int, size_t> vertex_node;
+  auto meet = [&](auto& map, const auto& key, size_t node) {
+    const auto [at, is_new] = map.emplace(key, node);
+    if (!is_new) nodes.join(at->second, node);
+  };
+  for (int f = 1; f <= faces.Extent(); ++f) {
+    TopLoc_Location place;
+    const Handle(Poly_Triangulation)& mesh = BRep_Tool::Triangulation(TopoDS::Face(faces(f)), place);
+    if (mesh.IsNull()) continue;
+    // FORWARD, so that the two sides of a seam edge give the two polygons of its closed surface.
+    for (TopExp_Explorer at(faces(f).Oriented(TopAbs_FORWARD), TopAbs_EDGE); at.More(); at.Next()) {
+      const TopoDS_Edge edge = TopoDS::Edge(at.Current());
+      const Handle(Poly_PolygonOnTriangulation)& line = BRep_Tool::PolygonOnTriangulation(edge, mesh, place);
+      if (line.IsNull()) throw std::runtime_error("an edge has no polygon on the triangulation of its face");
+      const int e = edges.Add(edge), n = line->NbNodes();
+      const int from = vertices.Add(TopExp::FirstVertex(edge)), to = vertices.Add(TopExp::LastVertex(edge));
+      const bool collapsed = BRep_Tool::Degenerated(edge);
+      for (int k = 1; k <= n; ++k) {
+        const size_t node = first_node[size_t(f) - 1] + size_t(line->Node(k)) - 1;
+        if (k == 1 || collapsed) meet(vertex_node, from, node);
+        else if (k == n) meet(vertex_node, to, node);
+        else meet(edge_node, std::make_pair(e, k), node);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<Shape> read_step(rust::Str path) {
+  STEPControl_Reader reader;
+  Interface_Static::SetCVal("xstep.cascade.unit", "MM");
+  if (reader.ReadFile(std::string(path).c_str()) != IFSelect_RetDone) throw std::runtime_error("not a readable STEP file");
+  reader.TransferRoots();
+  auto out = std::make_unique<Shape>();
+  out->shape = reader.OneShape();
+  if (out->shape.IsNull()) throw std::runtime_error("the STEP file holds no shape");
+  return out;
+}
+
+void write_step(const Shape& s, rust::Str path, const StepNames& names) {
+  // Order matters: without Init the settings do not exist yet, and the writer takes the schema when it is made.
+  STEPControl_Controller::Init();
+  if (!Interface_Static::SetIVal("write.step.schema", 5)) throw std::runtime_error("this OpenCASCADE cannot write STEP AP242");
+  Interface_Static::SetCVal("write.step.unit", "MM");
+  Interface_Static::SetIVal("write.step.assembly", 0);
+  Interface_Static::SetCVal("write.step.product.name", std::string(names.product).c_str());
+  STEPControl_Writer writer;
+  if (writer.Transfer(s.shape, STEPControl_AsIs) != IFSelect_RetDone) throw std::runtime_error("the shape could not be translated to STEP");
+  const Handle(Transfer_FinderProcess)& finder = writer.WS()->TransferWriter()->FinderProcess();
+  name_items(finder, s.shape, TopAbs_FACE, names.faces);
+  name_items(finder, s.shape, TopAbs_SOLID, names.solids);
+  fill_header(writer.Model(), names);
+  if (writer.Write(std::string(path).c_str()) != IFSelect_RetDone) throw std::runtime_error("the STEP file could not be written");
+}
+
+Triangulation tessellate(const Shape& s, double chord, double angle) {
+  BRepTools::Clean(s.shape);
+  BRepMesh_IncrementalMesh(s.shape, chord, false, angle, false);
+  TopTools_IndexedMapOfShape faces;
+  TopExp::MapShapes(s.shape, TopAbs_FACE, faces);
+  std::vector<size_t> first_node;
+  size_t total = 0;
+  for (int f = 1; f <= faces.Extent(); ++f) {
+    TopLoc_Location place;
+    const Handle(Poly_Triangulation)& mesh = BRep_Tool::Triangulation(TopoDS::Face(faces(f)), place);
+    if (mesh.IsNull()) throw std::runtime_error("face " + std::to_string(f - 1) + " could not be triangulated");
+    first_node.push_back(total);
+    total += size_t(mesh->NbNodes());
+  }
+  UnionFind nodes(total);
+  join_edges(faces, first_node, nodes);
+
+  Triangulation out;
+  std::vector<uint32_t> number(total, UINT32_MAX);
+  for (int f = 1; f <= faces.Extent(); ++f) {
+    TopLoc_Location place;
+    const Handle(Poly_Triangulation)& mesh = BRep_Tool::Triangulation(TopoDS::Face(faces(f)), place);
+    const bool flip = faces(f).Orientation() == TopAbs_REVERSED;
+    for (int t = 1; t <= mesh->NbTriangles(); ++t) {
+      int local[3];
+      mesh->Triangle(t).Get(local[0], local[1], local[2]);
+      size_t root[3];
+      for (int k = 0; k < 3; ++k) root[k] = nodes.find(first_node[size_t(f) - 1] + size_t(local[k]) - 1);
+      if (root[0] == root[1] || root[1] == root[2] || root[2] == root[0]) continue;
+      for (int k = 0; k < 3; ++k) {
+        if (number[root[k]] == UINT32_MAX) {
+          number[root[k]] = uint32_t(out.points.size() / 3);
+          const gp_Pnt p = mesh->Node(local[k]).Transformed(place.Transformation());
+          out.points.push_back(p.X());
+          out.points.push_back(p.Y());
+          out.points.push_back(p.Z());
+        }
+      }
+      for (int k = 0; k < 3; ++k) out.triangles.push_back(number[root[flip ? 2 - k : k]]);
+      out.faces.push_back(uint32_t(f) - 1);
+    }
+  }
+  return out;
+}
+
+}  // namespace grassfire

@@ -1,0 +1,241 @@
+//! Everything that the report says about the finished part.
+
+use grassfire_occt::{OcctError, Shape, Surface};
+use serde::Serialize;
+
+use super::bores::Bore;
+use super::build::{CadSolid, FaceSource, Kind};
+use super::non_design::NonDesignBody;
+use super::reference::Probe;
+use super::{CadError, CadOptions, array};
+use crate::Vec3;
+use crate::monitor::Monitor;
+
+/// How a non-design body came out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NonDesignResult {
+    /// Name of the body.
+    pub name: String,
+    /// File it came from.
+    pub source: String,
+    /// Faces of the part that lie on it.
+    pub faces: usize,
+    /// Share of its bore walls that are faces of the part; without bores, of all its faces.
+    pub coverage: f64,
+    /// Its material is all there, its faces are exact and its bores are open.
+    pub kept: bool,
+    /// Radii of its bores, mm.
+    pub bore_radii: Vec<f64>,
+    /// Largest distance of its faces in the part to the input, mm.
+    pub max_distance: f64,
+}
+
+/// What the inspection compares with.
+pub(crate) struct Context<'a> {
+    pub(crate) bodies: &'a [NonDesignBody],
+    pub(crate) options: &'a CadOptions,
+    /// Empty when there was no union.
+    pub(crate) probes: &'a [Probe],
+    /// Volume that the part must have, mm3.
+    pub(crate) reference: f64,
+}
+
+/// Points on each face that decide which body it belongs to.
+const SAMPLES: usize = 8;
+
+/// Finds for each face that is not organic the body, or the bore, whose surface it lies on.
+pub(crate) fn sources(shape: &Shape, kinds: &[Kind], context: &Context) -> Result<Vec<FaceSource>, CadError> {
+    let boxes: Vec<[[f64; 3]; 2]> = context.bodies.iter().map(|b| b.solid.bounds()).collect::<Result<_, _>>()?;
+    let mut out = Vec::with_capacity(kinds.len());
+    for (face, kind) in kinds.iter().enumerate() {
+        if *kind == Kind::Organic {
+            out.push(FaceSource::Organic);
+            continue;
+        }
+        let points: Vec<Vec3> = shape.face_samples(&[face as u32], SAMPLES)?.into_iter().map(Vec3::from).collect();
+        out.push(source(&points, *kind, context.bodies, &boxes)?);
+    }
+    Ok(out)
+}
+
+fn source(points: &[Vec3], kind: Kind, bodies: &[NonDesignBody], boxes: &[[[f64; 3]; 2]]) -> Result<FaceSource, OcctError> {
+    let mut best = (f64::MAX, FaceSource::Body(0));
+    for (b, body) in bodies.iter().enumerate() {
+        if kind == Kind::Bore {
+            for (k, bore) in body.bores.iter().enumerate() {
+                // Of two coaxial bores of one radius the nearer one.
+                let away = points.iter().map(|p| bore.distance(*p) + 1e-9 * overshoot(bore, *p)).fold(0.0, f64::max);
+                if away < best.0 {
+                    best = (away, FaceSource::Bore(b as u32, k as u32));
+                }
+            }
+        } else {
+            let outside = points.iter().map(|p| box_distance(&boxes[b], *p)).fold(0.0, f64::max);
+            if outside < best.0.min(1.0) {
+                let flat: Vec<[f64; 3]> = points.iter().map(|p| array(*p)).collect();
+                let away = body.solid.distances(&flat)?.into_iter().fold(0.0, f64::max);
+                if away < best.0 {
+                    best = (away, FaceSource::Body(b as u32));
+                }
+            }
+        }
+    }
+    Ok(best.1)
+}
+
+/// How far a point lies beyond the ends of a bore, mm.
+fn overshoot(bore: &Bore, p: Vec3) -> f64 {
+    let t = (p - bore.origin).dot(&bore.direction);
+    (bore.extent[0] - t).max(t - bore.extent[1]).max(0.0)
+}
+
+fn box_distance(bounds: &[[f64; 3]; 2], p: Vec3) -> f64 {
+    (0..3).map(|d| (bounds[0][d] - p[d]).max(p[d] - bounds[1][d]).max(0.0)).fold(0.0, f64::max)
+}
+
+/// Sources when the bodies lie side by side in a compound: their faces follow each other.
+pub(crate) fn separate_sources(organic: &[FaceSource], bodies: &[NonDesignBody]) -> Result<Vec<FaceSource>, OcctError> {
+    let mut out = organic.to_vec();
+    for (b, body) in bodies.iter().enumerate() {
+        out.extend(std::iter::repeat_n(FaceSource::Body(b as u32), body.solid.counts()?.faces as usize));
+    }
+    Ok(out)
+}
+
+/// Measures the part and decides whether it is valid.
+pub(crate) fn report(
+    shape: Shape,
+    sources: Vec<FaceSource>,
+    mut messages: Vec<String>,
+    context: &Context,
+    monitor: &Monitor,
+) -> Result<CadSolid, CadError> {
+    let mut valid = messages.iter().all(|m| m.starts_with("the union worked") || m.starts_with("uniting"));
+    let counts = shape.counts()?;
+    if let Some(text) = shape.faults()? {
+        valid = false;
+        messages.push(format!("BRepCheck: {text}"));
+    }
+    let volume = shape.volume(1e-8)?;
+    let euler = i64::from(counts.vertices) - i64::from(counts.edges) + 2 * i64::from(counts.faces) - i64::from(counts.wires);
+    let (mut g1_max, mut shortest) = (0.0f64, f64::MAX);
+    for edge in shape.edges()? {
+        shortest = shortest.min(edge.length);
+        let organic = |f: u32| sources.get(f as usize) == Some(&FaceSource::Organic);
+        if let (Some([a, b]), Some(angle)) = (edge.faces, edge.angle) {
+            if organic(a) && organic(b) {
+                g1_max = g1_max.max(angle.to_degrees());
+            }
+        }
+    }
+    monitor.check()?;
+    let mut non_design = Vec::with_capacity(context.bodies.len());
+    let faces = shape.faces()?;
+    for (b, body) in context.bodies.iter().enumerate() {
+        let result = if context.probes.is_empty() { separate(body) } else { united(&shape, &faces, &sources, b, context)? };
+        if !result.kept {
+            valid = false;
+            messages.push(format!(
+                "{}: not kept exactly (faces at most {:.1e} mm away, {:.1} % of its bore walls there, see the bores)",
+                result.name,
+                result.max_distance,
+                100.0 * result.coverage
+            ));
+        }
+        non_design.push(result);
+    }
+    for (probe, body) in context.probes.iter().zip(context.bodies) {
+        if probe.overlap <= 1e-6 * probe.region {
+            valid = false;
+            messages.push(format!("{} does not overlap the fitted body", body.name));
+        }
+    }
+    Ok(CadSolid {
+        valid,
+        bodies: counts.solids as usize,
+        faces: counts.faces as usize,
+        volume,
+        area: shape.area(1e-6)?,
+        genus: i64::from(counts.shells) - euler / 2,
+        g1_max,
+        shortest_edge: if shortest == f64::MAX { 0.0 } else { shortest },
+        max_tolerance: shape.max_tolerance()?,
+        volume_check: (volume - context.reference).abs() / context.reference.abs(),
+        non_design,
+        sources,
+        messages,
+        shape,
+    })
+}
+
+fn separate(body: &NonDesignBody) -> NonDesignResult {
+    NonDesignResult {
+        name: body.name.clone(),
+        source: body.source.clone(),
+        faces: 0,
+        coverage: 0.0,
+        kept: false,
+        bore_radii: body.bores.iter().map(|b| b.radius).collect(),
+        max_distance: 0.0,
+    }
+}
+
+fn united(shape: &Shape, faces: &[grassfire_occt::Face], sources: &[FaceSource], b: usize, context: &Context) -> Result<NonDesignResult, CadError> {
+    let body = &context.bodies[b];
+    let (mut own, mut walls) = (Vec::new(), Vec::new());
+    for (f, source) in sources.iter().enumerate() {
+        match *source {
+            FaceSource::Body(i) if i as usize == b => own.push(f as u32),
+            FaceSource::Bore(i, k) if i as usize == b => walls.push((f as u32, k as usize)),
+            _ => {}
+        }
+    }
+    let mut max_distance = body.solid.distances(&shape.face_samples(&own, SAMPLES)?)?.into_iter().fold(0.0, f64::max);
+    for &(face, k) in &walls {
+        for p in shape.face_samples(&[face], SAMPLES)? {
+            max_distance = max_distance.max(body.bores[k].distance(p.into()));
+        }
+    }
+    let area = |list: &mut dyn Iterator<Item = u32>| list.map(|f| faces[f as usize].area).sum::<f64>();
+    let (have, wanted) = if body.bores.is_empty() {
+        (area(&mut own.iter().copied()), body.solid.area(1e-6)?)
+    } else {
+        (area(&mut walls.iter().map(|w| w.0)), wall_area(body)?)
+    };
+    let coverage = (have / wanted).min(1.0);
+    let open = bores_open(shape, &body.bores)?;
+    let exact = max_distance <= context.options.distance_tolerance;
+    Ok(NonDesignResult {
+        name: body.name.clone(),
+        source: body.source.clone(),
+        faces: own.len() + walls.len(),
+        coverage,
+        kept: open && exact && (body.bores.is_empty() || coverage > 0.999),
+        bore_radii: body.bores.iter().map(|b| b.radius).collect(),
+        max_distance,
+    })
+}
+
+/// Area of the walls of a body's bores in the input.
+fn wall_area(body: &NonDesignBody) -> Result<f64, OcctError> {
+    let on_bore = |f: &grassfire_occt::Face| {
+        matches!(f.surface, Surface::Cylinder { concave: true, radius }
+            if body.bores.iter().any(|b| (b.radius - radius).abs() < 1e-6 && b.distance(f.middle.into()) < 1e-6))
+    };
+    Ok(body.solid.faces()?.iter().filter(|f| on_bore(f)).map(|f| f.area).sum())
+}
+
+/// No line along a bore, on its axis or near its wall, meets the part.
+fn bores_open(shape: &Shape, bores: &[Bore]) -> Result<bool, OcctError> {
+    for bore in bores {
+        let range = bore.free_range();
+        if shape.line_hits(&bore.lines(range))?.iter().any(|hits| !hits.is_empty()) {
+            return Ok(false);
+        }
+        let middle = bore.origin + bore.direction * ((range[0] + range[1]) / 2.0);
+        if shape.contains(array(middle))? {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}

@@ -1,0 +1,161 @@
+//! Non-design bodies: exact solids that end up in the part unchanged, from STEP or from meshes.
+
+use std::path::Path;
+
+use grassfire_occt::{OcctError, Operation, Shape};
+
+use super::bores::{self, Bore};
+use super::{CadError, NonDesignOptions, primitives, rebuild};
+use crate::mesh::TriMesh;
+use crate::monitor::Monitor;
+
+/// How exact the solid of a body is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Rebuilt {
+    /// The CAD file's own geometry.
+    Exact,
+    /// Planes, cylinders and cones about one axis, fitted to a mesh.
+    Revolution {
+        /// Largest distance of a mesh vertex to them, mm.
+        residual: f64,
+    },
+    /// Planes and bores fitted to a mesh.
+    Prismatic {
+        /// Largest distance of a mesh vertex to them, mm.
+        residual: f64,
+    },
+    /// The mesh's own triangles, coplanar ones merged.
+    Faceted,
+}
+
+/// A solid that must be in the part as it is.
+#[derive(Debug)]
+pub struct NonDesignBody {
+    /// Name for reports and STEP faces.
+    pub name: String,
+    /// File it came from.
+    pub source: String,
+    /// How the solid was made.
+    pub rebuilt: Rebuilt,
+    /// The exact solid.
+    pub solid: Shape,
+    /// The solid with its bores filled: this is what gets fused.
+    pub boss: Shape,
+    /// Its bores: these are cut after the union.
+    pub bores: Vec<Bore>,
+    /// Volume of the solid, mm3.
+    pub volume: f64,
+}
+
+const STAGE: &str = "cad";
+const VOLUME_EPS: f64 = 1e-9;
+
+/// Reads the non-design bodies of a STEP file: each solid is one.
+///
+/// # Errors
+/// [`CadError::Unreadable`], [`CadError::NoSolid`], [`CadError::InvalidSolid`].
+pub fn read(path: &Path, options: &NonDesignOptions, monitor: &Monitor) -> Result<Vec<NonDesignBody>, CadError> {
+    let source = path.display().to_string();
+    monitor.step(STAGE, "reading non-design bodies", 0.0)?;
+    let shape = Shape::read_step(path).map_err(|e| CadError::Unreadable { path: source.clone(), text: e.0 })?;
+    let solids = shape.solids()?;
+    if solids.is_empty() {
+        return Err(CadError::NoSolid { path: source, faces: shape.counts()?.faces });
+    }
+    let stem = path.file_stem().map_or_else(|| "body".into(), |s| s.to_string_lossy().into_owned());
+    let many = solids.len() > 1;
+    let mut out = Vec::with_capacity(solids.len());
+    for (i, solid) in solids.into_iter().enumerate() {
+        monitor.check()?;
+        let name = if many { format!("{stem} {}", i + 1) } else { stem.clone() };
+        out.push(body(name, &source, Rebuilt::Exact, solid, options, monitor)?);
+    }
+    Ok(out)
+}
+
+/// Makes non-design bodies from a mesh: each connected part is one.
+///
+/// 1. Weld, split into connected parts, orient.
+/// 2. Cut each part into smooth regions at sharp edges and fit planes, cylinders and cones.
+/// 3. All about one axis: turn the exact profile. Planes and bores only: plane polyhedron with cut bores. Else: the
+///    triangles themselves, with a warning.
+///
+/// A part whose surface points inward is turned; cavities inside a part are read as bodies of their own.
+///
+/// # Errors
+/// [`CadError::OpenMesh`], [`CadError::BadMesh`], [`CadError::InvalidSolid`].
+pub fn from_mesh(
+    name: &str,
+    source: &str,
+    mesh: &TriMesh,
+    options: &NonDesignOptions,
+    monitor: &Monitor,
+) -> Result<Vec<NonDesignBody>, CadError> {
+    let parts = primitives::parts(name, mesh)?;
+    let many = parts.len() > 1;
+    let mut out = Vec::with_capacity(parts.len());
+    for (i, part) in parts.iter().enumerate() {
+        monitor.step(STAGE, "rebuilding non-design bodies", i as f64 / parts.len() as f64)?;
+        let name = if many { format!("{name} {}", i + 1) } else { name.to_owned() };
+        let (solid, rebuilt) = rebuild::solid(&name, part, options, monitor)?;
+        out.push(body(name, source, rebuilt, solid, options, monitor)?);
+    }
+    Ok(out)
+}
+
+fn body(
+    name: String,
+    source: &str,
+    rebuilt: Rebuilt,
+    solid: Shape,
+    options: &NonDesignOptions,
+    monitor: &Monitor,
+) -> Result<NonDesignBody, CadError> {
+    let fail = |text: String| CadError::InvalidSolid { name: name.clone(), text };
+    if let Some(text) = solid.faults()? {
+        return Err(fail(text));
+    }
+    let open = solid.counts()?.bad_edges;
+    if open > 0 {
+        return Err(fail(format!("{open} edges have not exactly two faces")));
+    }
+    let volume = solid.volume(VOLUME_EPS)?;
+    if volume.is_nan() || volume <= 0.0 {
+        return Err(fail(format!("the volume is {volume} mm3")));
+    }
+    let mut found = bores::find(&solid)?;
+    let boss = match fill(&solid, &found, volume) {
+        Ok(boss) => boss,
+        Err(text) => {
+            monitor.warn(STAGE, format!("{name}: its {} bores could not be filled before the union ({text}); it is fused as it is", found.len()));
+            solid.share()?
+        }
+    };
+    for bore in &mut found {
+        bores::extend(bore, options.bore_extension, &[&solid])?;
+    }
+    Ok(NonDesignBody { name, source: source.to_owned(), rebuilt, solid, boss, bores: found, volume })
+}
+
+/// The solid with its bores filled; the volumes must add up.
+fn fill(solid: &Shape, bores: &[Bore], volume: f64) -> Result<Shape, String> {
+    let text = |e: OcctError| e.0;
+    let (mut boss, mut total) = (solid.share().map_err(text)?, volume);
+    for bore in bores {
+        let plug = bore.plug().map_err(text)?;
+        total += plug.volume(VOLUME_EPS).map_err(text)?;
+        boss = boss.boolean(Operation::Fuse, &plug, 1e-6, false, &|| false).map_err(text)?.shape;
+    }
+    if bores.is_empty() {
+        return Ok(boss);
+    }
+    let boss = boss.unified().map_err(text)?;
+    let got = boss.volume(VOLUME_EPS).map_err(text)?;
+    let counts = boss.counts().map_err(text)?;
+    match boss.faults().map_err(text)? {
+        Some(fault) => Err(fault),
+        None if counts.solids != 1 || counts.bad_edges != 0 => Err(format!("{} solids, {} open edges", counts.solids, counts.bad_edges)),
+        None if (got - total).abs() > 1e-6 * total => Err(format!("volume {got:.6} instead of {total:.6} mm3")),
+        None => Ok(boss),
+    }
+}

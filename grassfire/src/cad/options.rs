@@ -1,0 +1,76 @@
+//! Options of the CAD stage.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How the B-rep is built, united and checked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CadOptions {
+    /// Parts closer than this count as touching in booleans, mm. Never 0: that can silently lose volume.
+    pub fuzzy: f64,
+    /// The same for the second attempt, mm.
+    pub fuzzy_retry: f64,
+    /// How far the organic side is moved in the attempt before the last ones, mm.
+    pub shift: f64,
+    /// Largest accepted difference of the independent volume, as a share of the volume of the non-design bodies.
+    pub volume_tolerance: f64,
+    /// Largest accepted distance of non-design faces to the input CAD, mm.
+    pub distance_tolerance: f64,
+    /// A boolean that runs longer than this counts as failed, s.
+    pub boolean_seconds: f64,
+    /// Rays across each non-design body in the independent volume check.
+    pub rays: u32,
+}
+
+impl Default for CadOptions {
+    fn default() -> Self {
+        Self {
+            fuzzy: 1e-5,
+            fuzzy_retry: 1e-4,
+            shift: 0.01,
+            volume_tolerance: 2e-3,
+            distance_tolerance: 1e-3,
+            boolean_seconds: 300.0,
+            rays: 400,
+        }
+    }
+}
+
+/// How non-design bodies are read and rebuilt.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct NonDesignOptions {
+    /// A mesh becomes planes, cylinders and cones when no vertex is farther from them than this, mm.
+    pub mesh_tolerance: f64,
+    /// Neighbouring triangles that differ by less belong to one smooth surface, degrees.
+    pub sharp_angle: f64,
+    /// Open bores are kept free beyond their ends by this many radii.
+    pub bore_extension: f64,
+}
+
+impl Default for NonDesignOptions {
+    fn default() -> Self {
+        Self { mesh_tolerance: 0.02, sharp_angle: 25.0, bore_extension: 1.0 }
+    }
+}
+
+/// Texts in the STEP file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct StepOptions {
+    /// Product name.
+    pub product: String,
+    /// Author.
+    pub author: String,
+    /// Organization.
+    pub organization: String,
+    /// Time stamp of the header (ISO 8601); empty means now. Fix it to get equal files.
+    pub time_stamp: String,
+}
+
+impl Default for StepOptions {
+    fn default() -> Self {
+        Self { product: "part".into(), author: String::new(), organization: String::new(), time_stamp: String::new() }
+    }
+}
