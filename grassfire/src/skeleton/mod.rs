@@ -1,6 +1,30 @@
 //! The decomposition structure: an all-quad non-manifold skeleton with beams and one radius a point.
 
+mod arcs;
+mod build;
+mod check;
+mod coarsen;
+mod complex;
+mod edges;
+mod error;
+mod members;
+mod nearest;
+mod pairing;
+mod polygons;
+mod reduce;
+mod reference;
+mod stats;
+mod tidy;
+mod walk;
+
+pub use build::{SkeletonOptions, quad_skeleton};
+pub use check::check;
+pub use error::SkeletonError;
+pub(crate) use nearest::PointGrid;
+pub use stats::{Deviation, Range, SkeletonStats, stats, topology};
+
 use crate::Vec3;
+use crate::topology::Betti;
 
 /// Quads (sheets) and beams (curves) with a radius at every point; what a user may edit.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -13,4 +37,15 @@ pub struct Skeleton {
     pub quads: Vec<[u32; 4]>,
     /// Edges without quads.
     pub beams: Vec<[u32; 2]>,
+}
+
+/// The skeleton of a medial axis, with the proof that its topology was kept and its figures.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct QuadSkeleton {
+    /// The skeleton.
+    pub skeleton: Skeleton,
+    /// Betti numbers of the skeleton, equal to those of the medial mesh.
+    pub topology: Betti,
+    /// Counts and quality.
+    pub stats: SkeletonStats,
 }

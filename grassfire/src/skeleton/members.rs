@@ -1,0 +1,331 @@
+//! Narrow and tiny sheets burnt to beams, so that slender members do not flicker between sheet and beam.
+//!
+//! 1. Cut the complex open along its seams and measure, inside each sheet, the distance to the rim.
+//! 2. Core: faces farther than half the member width from the rim; a core must somewhere be clearly wider (hysteresis).
+//! 3. Wide: everything within that distance of a core (a geodesic opening); pieces smaller than the member size drop out.
+//! 4. The rest burns from its free edges inward, in the order of the distance: elementary collapses, so the homotopy type
+//!    stays. Hairs that run straight toward the rim go at once; real spurs are left to the pruning by protrusion.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::build::SkeletonOptions;
+use super::complex::Complex;
+use super::edges::{EdgeTable, UnionFind, edge};
+use crate::monitor::{Cancelled, Monitor};
+
+/// A core must somewhere be wider than the member width by this factor.
+const CLEARLY: f64 = 1.25;
+/// The opening reaches a little farther than the core's distance: graph distances are over-estimates.
+const REACH: f64 = 1.2;
+/// A dangling edge whose rim distance falls faster than this toward its tip is a hair, not a member.
+const HAIR: f64 = 0.4;
+
+/// Total order for the heap; the values are never NaN.
+#[derive(PartialEq)]
+struct Key(f64);
+
+impl Eq for Key {}
+
+impl PartialOrd for Key {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Key {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.0.total_cmp(&other.0)
+    }
+}
+
+/// Burns narrow and tiny sheets of `c` to beams; compacts.
+pub(crate) fn burn_members(
+    c: &mut Complex,
+    unit: f64,
+    options: &SkeletonOptions,
+    monitor: &Monitor,
+) -> Result<(), Cancelled> {
+    if c.alive().next().is_none() {
+        return Ok(());
+    }
+    let table = c.edge_table();
+    let cut = Cut::new(c, &table);
+    let distance = cut.distances(&cut.rim_nodes(&table), f64::INFINITY);
+    monitor.check()?;
+    let wide = wide_faces(c, &table, &cut, &distance, unit, options);
+    monitor.check()?;
+    burn(c, &cut, &distance, &wide);
+    c.compact();
+    Ok(())
+}
+
+/// The complex cut open along its seams: one node for each fan of triangles at a vertex.
+struct Cut {
+    /// Node of each triangle corner.
+    node: Vec<[u32; 3]>,
+    /// Vertex of each node.
+    vertex: Vec<u32>,
+    /// Neighbours of each node with the distance.
+    near: Vec<Vec<(u32, f64)>>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Cut {
+    fn new(c: &Complex, table: &EdgeTable) -> Self {
+        let mut sets = UnionFind::new(3 * c.triangles.len());
+        let corner = |t: u32, v: u32| 3 * t + c.tri(t).iter().position(|&w| w == v).unwrap_or(0) as u32;
+        for ([a, b], f) in table.iter() {
+            if let [s, t] = *f {
+                sets.join(corner(s, a), corner(t, a));
+                sets.join(corner(s, b), corner(t, b));
+            }
+        }
+        let mut name = vec![u32::MAX; 3 * c.triangles.len()];
+        let mut cut = Self {
+            node: vec![[u32::MAX; 3]; c.triangles.len()],
+            vertex: Vec::new(),
+            near: Vec::new(),
+            triangles: c.triangles.clone(),
+        };
+        for t in c.alive() {
+            for k in 0..3 {
+                let root = sets.find(3 * t + k) as usize;
+                if name[root] == u32::MAX {
+                    name[root] = cut.vertex.len() as u32;
+                    cut.vertex.push(c.tri(t)[k as usize]);
+                }
+                cut.node[t as usize][k as usize] = name[root];
+            }
+        }
+        cut.near = vec![Vec::new(); cut.vertex.len()];
+        for t in c.alive() {
+            let (v, n) = (c.tri(t), cut.node[t as usize]);
+            for k in 0..3 {
+                let j = (k + 1) % 3;
+                let d = c.length(v[k], v[j]);
+                cut.near[n[k] as usize].push((n[j], d));
+                cut.near[n[j] as usize].push((n[k], d));
+            }
+        }
+        cut
+    }
+
+    fn node_at(&self, t: u32, v: u32) -> u32 {
+        let k = self.triangles[t as usize].iter().position(|&w| w == v).unwrap_or(0);
+        self.node[t as usize][k]
+    }
+
+    fn rim_nodes(&self, table: &EdgeTable) -> Vec<u32> {
+        let mut out = Vec::new();
+        for ([a, b], f) in table.iter() {
+            if let [t] = *f {
+                out.extend([self.node_at(t, a), self.node_at(t, b)]);
+            }
+        }
+        out.sort_unstable();
+        out.dedup();
+        out
+    }
+
+    /// Dijkstra from `sources` up to `limit`; infinite where not reached.
+    fn distances(&self, sources: &[u32], limit: f64) -> Vec<f64> {
+        let mut distance = vec![f64::INFINITY; self.vertex.len()];
+        let mut heap = BinaryHeap::new();
+        for &s in sources {
+            distance[s as usize] = 0.0;
+            heap.push(Reverse((Key(0.0), s)));
+        }
+        while let Some(Reverse((Key(d), n))) = heap.pop() {
+            if d > distance[n as usize] {
+                continue;
+            }
+            for &(m, step) in &self.near[n as usize] {
+                let next = d + step;
+                if next < distance[m as usize] && next <= limit {
+                    distance[m as usize] = next;
+                    heap.push(Reverse((Key(next), m)));
+                }
+            }
+        }
+        distance
+    }
+}
+
+/// True for faces that stay a sheet.
+fn wide_faces(
+    c: &Complex,
+    table: &EdgeTable,
+    cut: &Cut,
+    distance: &[f64],
+    unit: f64,
+    options: &SkeletonOptions,
+) -> Vec<bool> {
+    let half = options.member_width / 2.0;
+    let radius = |t: u32| c.tri(t).iter().map(|&v| c.radii[v as usize]).sum::<f64>() / 3.0;
+    let depth = |t: u32| cut.node[t as usize].iter().map(|&n| distance[n as usize]).sum::<f64>() / 3.0;
+    let n = c.triangles.len();
+    let mut core = vec![false; n];
+    for t in c.alive() {
+        core[t as usize] = depth(t) > half * radius(t);
+    }
+    let clear: Vec<u32> = c.alive().filter(|&t| depth(t) > CLEARLY * half * radius(t)).collect();
+    let mut sets = components(table, &core);
+    let mut keep = vec![false; n];
+    for t in clear {
+        keep[sets.find(t) as usize] = true;
+    }
+    let sources: Vec<u32> = c
+        .alive()
+        .filter(|&t| core[t as usize] && keep[sets.find(t) as usize])
+        .flat_map(|t| cut.node[t as usize])
+        .collect();
+    let reach = cut.distances(&sources, f64::INFINITY);
+    let mut wide = vec![false; n];
+    for t in c.alive() {
+        let near = |&m: &u32| {
+            let r = c.radii[cut.vertex[m as usize] as usize];
+            reach[m as usize] <= REACH * half * r + 0.6 * unit
+        };
+        wide[t as usize] = cut.node[t as usize].iter().all(near);
+    }
+    drop_tiny(c, table, &mut wide, options.member_size);
+    wide
+}
+
+/// Face sets joined over edges with two faces that both belong to `set`.
+fn components(table: &EdgeTable, set: &[bool]) -> UnionFind {
+    let mut sets = UnionFind::new(set.len());
+    for (_, f) in table.iter() {
+        if let [s, t] = *f
+            && set[s as usize]
+            && set[t as usize]
+        {
+            sets.join(s, t);
+        }
+    }
+    sets
+}
+
+fn drop_tiny(c: &Complex, table: &EdgeTable, wide: &mut [bool], size: f64) {
+    let mut sets = components(table, wide);
+    let mut area = vec![0.0; wide.len()];
+    let mut weighted = vec![0.0; wide.len()];
+    for t in c.alive().filter(|&t| wide[t as usize]) {
+        let [p, q, s] = c.tri(t).map(|v| c.points[v as usize]);
+        let a = (q - p).cross(&(s - p)).norm() / 2.0;
+        let r = c.tri(t).iter().map(|&v| c.radii[v as usize]).sum::<f64>() / 3.0;
+        let root = sets.find(t) as usize;
+        area[root] += a;
+        weighted[root] += a * r;
+    }
+    for t in c.alive() {
+        let root = sets.find(t) as usize;
+        if wide[t as usize] && area[root].powi(3) < (size * weighted[root]).powi(2) {
+            wide[t as usize] = false;
+        }
+    }
+}
+
+/// Burns the faces that are not wide, nearest to the rim first.
+fn burn(c: &mut Complex, cut: &Cut, distance: &[f64], wide: &[bool]) {
+    let depth =
+        |t: u32| cut.node[t as usize].iter().map(|&n| distance[n as usize]).sum::<f64>() / 3.0;
+    // Rim distance of a vertex: the farthest of its fans, which is the one that burns last.
+    let mut height = vec![0.0f64; c.points.len()];
+    for (n, &v) in cut.vertex.iter().enumerate() {
+        if distance[n].is_finite() {
+            height[v as usize] = height[v as usize].max(distance[n]);
+        }
+    }
+    let old_beams = c.beams.len();
+    let mut heap: BinaryHeap<Reverse<(Key, u32)>> =
+        c.alive().filter(|&t| !wide[t as usize]).map(|t| Reverse((Key(depth(t)), t))).collect();
+    let mut hairs: Vec<u32> = Vec::new();
+    while let Some(Reverse((_, t))) = heap.pop() {
+        if c.tri(t)[0] == super::complex::DEAD {
+            continue;
+        }
+        let v = c.tri(t);
+        let mut sides = [edge(v[0], v[1]), edge(v[1], v[2]), edge(v[2], v[0])];
+        sides.sort_by(|x, y| c.length(y[0], y[1]).total_cmp(&c.length(x[0], x[1])).then(x.cmp(y)));
+        let Some(&free) = sides.iter().find(|e| c.face_count(e[0], e[1]) == 1) else { continue };
+        c.remove_triangle(t);
+        for e in sides {
+            let faces = c.on_edge(e[0], e[1]);
+            match faces[..] {
+                [] if e != free => c.add_beam(e),
+                [f] if !wide[f as usize] => heap.push(Reverse((Key(depth(f)), f))),
+                _ => {}
+            }
+        }
+        hairs.extend(v);
+        while let Some(tip) = hairs.pop() {
+            remove_hair(c, tip, old_beams, &height, &mut hairs);
+        }
+    }
+}
+
+fn remove_hair(c: &mut Complex, tip: u32, old_beams: usize, height: &[f64], next: &mut Vec<u32>) {
+    let [beam] = c.vertex_beams[tip as usize][..] else { return };
+    if !c.vertex_triangles[tip as usize].is_empty() || (beam as usize) < old_beams {
+        return;
+    }
+    let [p, q] = c.beams[beam as usize];
+    let root = if p == tip { q } else { p };
+    let alone = c.vertex_beams[root as usize].len() == 1 && c.vertex_triangles[root as usize].is_empty();
+    let rise = height[root as usize] - height[tip as usize];
+    if !alone && rise > HAIR * c.length(tip, root) {
+        c.remove_beam(beam);
+        next.push(root);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Vec3;
+
+    /// A grid of `nx` by `ny` unit cells, two triangles each; `keep` chooses the cells.
+    fn sheet(nx: u32, ny: u32, keep: impl Fn(u32, u32) -> bool) -> Complex {
+        let points = (0..(nx + 1) * (ny + 1))
+            .map(|i| Vec3::new(f64::from(i % (nx + 1)), f64::from(i / (nx + 1)), 0.0))
+            .collect();
+        let mut triangles = Vec::new();
+        for y in 0..ny {
+            for x in 0..nx {
+                let a = y * (nx + 1) + x;
+                let (b, d) = (a + 1, a + nx + 1);
+                if keep(x, y) {
+                    triangles.extend([[a, b, d + 1], [a, d + 1, d]]);
+                }
+            }
+        }
+        let n = ((nx + 1) * (ny + 1)) as usize;
+        let mut c = Complex::new(points, vec![2.0; n], &triangles, &[]);
+        c.compact();
+        c
+    }
+
+    #[test]
+    fn ribbon_becomes_a_curve_and_plate_stays() {
+        let mut ribbon = sheet(40, 3, |_, _| true);
+        let before = ribbon.betti();
+        burn_members(&mut ribbon, 1.0, &SkeletonOptions::default(), &Monitor::default()).expect("not cancelled");
+        assert_eq!(ribbon.betti(), before);
+        assert_eq!(ribbon.alive().count(), 0);
+        assert!(ribbon.alive_beams().count() > 30);
+        let mut plate = sheet(40, 20, |_, _| true);
+        burn_members(&mut plate, 1.0, &SkeletonOptions::default(), &Monitor::default()).expect("not cancelled");
+        assert!(plate.alive().count() > 1500);
+    }
+
+    #[test]
+    fn narrow_ring_keeps_its_loop() {
+        let mut ring = sheet(20, 20, |x, y| !(3..17).contains(&x) || !(3..17).contains(&y));
+        let before = ring.betti();
+        burn_members(&mut ring, 1.0, &SkeletonOptions::default(), &Monitor::default()).expect("not cancelled");
+        assert_eq!(ring.betti(), before);
+        assert_eq!(ring.alive().count(), 0);
+    }
+}
