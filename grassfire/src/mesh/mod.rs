@@ -1,5 +1,6 @@
 //! Triangle meshes: the soup that files hold, and the validated closed solid.
 
+pub mod self_intersection;
 mod solid;
 
 pub use solid::{Solid, SolidError};

@@ -1,5 +1,7 @@
 //! Control mesh -> exact G1 bi-5/bi-3 patches -> few B-spline faces -> boundary representation.
 
+pub mod catmull_clark;
+
 use crate::Vec3;
 
 /// A closed quad mesh: the control net of a Catmull-Clark surface.
