@@ -3,6 +3,7 @@
 pub mod bvh;
 pub mod distance;
 mod repair;
+pub mod self_intersection;
 mod solid;
 pub mod winding;
 

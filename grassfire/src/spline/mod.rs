@@ -21,6 +21,7 @@ pub use measure::{area, volume};
 pub use patches::{PatchOptions, patches};
 pub use quality::{FoldReport, G1Report, g1_max, worst_fold};
 pub use tessellate::{SurfaceSample, TessellateOptions, Tessellation, tessellate};
+pub mod catmull_clark;
 
 use crate::Vec3;
 

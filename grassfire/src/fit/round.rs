@@ -1,0 +1,217 @@
+//! One Gauss-Newton round, and distances between the limit surface and the iso-surface.
+
+use nalgebra::Matrix3;
+use rayon::prelude::*;
+
+use super::equations::Equations;
+use super::surface::Surface;
+use super::targets::{IsoSamples, PointGrid, flow_to_surface};
+use super::{Distances, FitError, FitOptions, FitRound};
+use crate::Vec3;
+use crate::voxel::VoxelGrid;
+
+/// The system with the local weights that untangling changes.
+pub(super) struct Solver<'a> {
+    pub surface: &'a Surface,
+    field: &'a VoxelGrid<f32>,
+    iso: &'a IsoSamples,
+    options: FitOptions,
+    equations: Equations,
+    /// Factor on the fairness of each control point.
+    pub fairness: Vec<f64>,
+    /// Factor on the data of each sample.
+    pub trust: Vec<f64>,
+    /// Pull of each control point towards a place, relative to the data; empty for none.
+    pub pins: Vec<(u32, f64, Vec3)>,
+}
+
+/// Weights of one round.
+struct Schedule {
+    /// Distance from which on a sample counts less, voxels.
+    cap: f64,
+    fairness: f64,
+    tangential: f64,
+}
+
+impl<'a> Solver<'a> {
+    pub fn new(
+        surface: &'a Surface,
+        field: &'a VoxelGrid<f32>,
+        iso: &'a IsoSamples,
+        options: &FitOptions,
+    ) -> Result<Self, FitError> {
+        let equations = Equations::new(&[&surface.samples, &surface.bending])
+            .map_err(|reason| FitError::Solver { round: 0, reason })?;
+        Ok(Self {
+            surface,
+            field,
+            iso,
+            options: *options,
+            equations,
+            fairness: vec![1.0; surface.coarse.point_count],
+            trust: vec![1.0; surface.samples.rows()],
+            pins: Vec::new(),
+        })
+    }
+
+    /// Round `round`: weights harden with its number. Moves `points`.
+    pub fn round(&mut self, points: &mut [Vec3], round: u32) -> Result<FitRound, FitError> {
+        let decay = i32::try_from(round).unwrap_or(i32::MAX);
+        let schedule = Schedule {
+            cap: (8.0 * 0.7f64.powi(decay)).max(2.0),
+            fairness: 0.6f64.powi(decay).max(self.options.fairness),
+            tangential: if round > 3 { 0.03 } else { 0.1 },
+        };
+        let at = self.surface.samples.apply(points);
+        let (normals, areas) = self.surface.normals_and_areas(&at);
+        let area: f64 = areas.iter().sum();
+        let mean_area = area / points.len().max(1) as f64;
+        self.equations.clear();
+        let distance = self.add_data(&at, &normals, &areas, &schedule);
+        self.add_fairness(points, mean_area, schedule.fairness);
+        let solution = self.equations.solve().map_err(|reason| FitError::Solver { round, reason })?;
+        let mut total = 0.0;
+        for (p, wanted) in points.iter_mut().zip(&solution) {
+            let step = wanted - *p;
+            let length = step.norm();
+            *p += step * (self.options.max_step / length.max(1e-9)).min(1.0);
+            total += length;
+        }
+        let mm = self.field.spacing;
+        Ok(FitRound { mean_distance: mm * distance / area.max(1e-300), step: mm * total / points.len().max(1) as f64 })
+    }
+
+    /// Point-to-plane rows both ways and tangential damping; returns the area-weighted distance sum.
+    fn add_data(&mut self, at: &[Vec3], normals: &[Vec3], areas: &[f64], schedule: &Schedule) -> f64 {
+        let flowed: Vec<(Vec3, Vec3)> =
+            at.par_iter().with_min_len(512).map(|p| flow_to_surface(self.field, p, 6)).collect();
+        let mut blocks = vec![Matrix3::zeros(); at.len()];
+        let mut pulls = vec![Vec3::zeros(); at.len()];
+        let mut sum = 0.0;
+        for (j, (place, outward)) in flowed.iter().enumerate() {
+            let d = (place - at[j]).norm();
+            sum += areas[j] * d;
+            let cosine = outward.dot(&normals[j]);
+            if cosine >= 0.2 {
+                let w = self.trust[j] * areas[j] * cosine.min(1.0) * (schedule.cap / d.max(1e-9)).min(1.0);
+                blocks[j] += w * outward * outward.transpose();
+                pulls[j] += w * outward * outward.dot(place);
+            }
+            let w = schedule.tangential * areas[j];
+            blocks[j] += w * Matrix3::identity();
+            pulls[j] += w * at[j];
+        }
+        let share = areas.iter().sum::<f64>() / self.iso.points.len().max(1) as f64;
+        let grid = PointGrid::new(at, 1.5);
+        let nearest: Vec<Option<(u32, f64)>> =
+            self.iso.points.par_iter().with_min_len(512).map(|p| grid.nearest(at, p)).collect();
+        for ((place, outward), found) in self.iso.points.iter().zip(&self.iso.normals).zip(&nearest) {
+            let Some((j, d)) = *found else { continue };
+            let j = j as usize;
+            let cosine = outward.dot(&normals[j]);
+            if cosine > 0.1 {
+                let w = self.trust[j] * share * cosine * (schedule.cap / d.max(1e-9)).min(1.0);
+                blocks[j] += w * outward * outward.transpose();
+                pulls[j] += w * outward * outward.dot(place);
+            }
+        }
+        for j in 0..at.len() {
+            let (points, weights) = self.surface.samples.row(j);
+            self.equations.add(points, weights, &blocks[j], &pulls[j]);
+        }
+        sum
+    }
+
+    fn add_fairness(&mut self, points: &[Vec3], mean_area: f64, fairness: f64) {
+        let identity = Matrix3::identity();
+        for r in 0..points.len() {
+            let weight = fairness * mean_area * self.fairness[r];
+            let (indices, weights) = self.surface.bending.row(r);
+            self.equations.add(indices, weights, &(weight * identity), &Vec3::zeros());
+            let (indices, weights) = self.surface.laplacian.row(r);
+            self.equations.add(indices, weights, &(0.02 * fairness * mean_area * identity), &Vec3::zeros());
+        }
+        for (p, place) in points.iter().enumerate() {
+            self.equations.pin(p as u32, 1e-3 * mean_area, place);
+        }
+        for (p, weight, place) in &self.pins {
+            self.equations.pin(*p, weight * mean_area, place);
+        }
+    }
+
+    /// Distances of the limit surface to f = 0, by flow along the gradient.
+    pub fn body_to_iso(&self, points: &[Vec3]) -> Distances {
+        let at = self.surface.samples.apply(points);
+        let (_, areas) = self.surface.normals_and_areas(&at);
+        let distances: Vec<f64> = at
+            .par_iter()
+            .with_min_len(512)
+            .map(|p| (flow_to_surface(self.field, p, 12).0 - p).norm())
+            .collect();
+        self.summary(distances.into_iter().zip(areas).collect())
+    }
+
+    /// Distances of the iso-surface samples to the limit surface.
+    pub fn iso_to_body(&self, points: &[Vec3]) -> Distances {
+        let at = self.surface.samples.apply(points);
+        let grid = PointGrid::new(&at, 1.5);
+        let fine = &self.surface.fine;
+        let distance = |p: &Vec3| {
+            let Some((j, d)) = grid.nearest(&at, p) else { return 0.0 };
+            fine.ring(j)
+                .flat_map(|h| {
+                    let [a, b, c, d] = fine.quads[(h / 4) as usize].map(|v| at[v as usize]);
+                    [[a, b, c], [a, c, d]]
+                })
+                .map(|t| distance_to_triangle(p, &t))
+                .fold(d, f64::min)
+        };
+        let distances: Vec<f64> = self.iso.points.par_iter().with_min_len(512).map(distance).collect();
+        self.summary(distances.into_iter().map(|d| (d, 1.0)).collect())
+    }
+
+    /// Weighted summary of (distance in voxels, weight), in mm.
+    fn summary(&self, mut list: Vec<(f64, f64)>) -> Distances {
+        list.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let total: f64 = list.iter().map(|x| x.1).sum();
+        let square: f64 = list.iter().map(|x| x.1 * x.0 * x.0).sum();
+        let mut below = 0.0;
+        let p95 = list.iter().find(|x| {
+            below += x.1;
+            below >= 0.95 * total
+        });
+        let mm = self.field.spacing;
+        Distances {
+            rms: mm * (square / total.max(1e-300)).sqrt(),
+            p95: mm * p95.map_or(0.0, |x| x.0),
+            max: mm * list.last().map_or(0.0, |x| x.0),
+        }
+    }
+}
+
+/// Distance of a point to a triangle (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
+fn distance_to_triangle(p: &Vec3, [a, b, c]: &[Vec3; 3]) -> f64 {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
+    let (bp, cp) = (p - b, p - c);
+    let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
+    let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
+    let (va, vb, vc) = (d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2);
+    let nearest = if d1 <= 0.0 && d2 <= 0.0 {
+        *a
+    } else if d3 >= 0.0 && d4 <= d3 {
+        *b
+    } else if d6 >= 0.0 && d5 <= d6 {
+        *c
+    } else if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        a + ab * (d1 / (d1 - d3))
+    } else if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        a + ac * (d2 / (d2 - d6))
+    } else if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)))
+    } else {
+        let sum = va + vb + vc;
+        a + ab * (vb / sum) + ac * (vc / sum)
+    };
+    (nearest - p).norm()
+}

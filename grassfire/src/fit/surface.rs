@@ -1,0 +1,119 @@
+//! The limit surface as a linear function of the control points, in voxel units of the field.
+
+use faer::sparse::{SparseColMat, Triplet};
+use faer::{Mat, Side, prelude::Solve};
+
+use super::FitError;
+use crate::Vec3;
+use crate::mesh::TriMesh;
+use crate::spline::ControlMesh;
+use crate::spline::catmull_clark::{QuadTopology, Stencils, limit_operator, triangles_of};
+use crate::thicken::ThickenedBody;
+use crate::voxel::VoxelGrid;
+
+/// Splits before sampling: 16 samples a quad.
+pub(super) const LEVELS: u32 = 2;
+
+/// Operators that depend on the connectivity only, and the thickened points in voxel units.
+pub(super) struct Surface {
+    pub coarse: QuadTopology,
+    /// Connectivity of the samples.
+    pub fine: QuadTopology,
+    /// Control points to samples on the limit surface.
+    pub samples: Stencils,
+    pub laplacian: Stencils,
+    /// The Laplacian of the Laplacian.
+    pub bending: Stencils,
+    pub thickened: Vec<Vec3>,
+    pub triangles: Vec<[u32; 3]>,
+    /// Control quad of each triangle.
+    pub owner: Vec<u32>,
+    origin: Vec3,
+    spacing: f64,
+}
+
+impl Surface {
+    pub fn new(body: &ThickenedBody, field: &VoxelGrid<f32>) -> Result<Self, FitError> {
+        let n = body.mesh.points.len();
+        let coarse = QuadTopology::new(n, &body.mesh.quads)?;
+        let (samples, fine) = limit_operator(n, &body.mesh.quads, LEVELS)?;
+        let laplacian = coarse.laplacian();
+        let bending = laplacian.after(&laplacian);
+        let (triangles, owner) = triangles_of(&fine.quads, LEVELS);
+        let thickened = body.mesh.points.iter().map(|p| field.to_grid(p)).collect();
+        let (origin, spacing) = (field.origin, field.spacing);
+        Ok(Self { coarse, fine, samples, laplacian, bending, thickened, triangles, owner, origin, spacing })
+    }
+
+    /// Control points whose limit surface follows the thickened points, damped towards them.
+    pub fn damped_start(&self) -> Result<Vec<Vec3>, FitError> {
+        self.damped(&self.thickened)
+    }
+
+    /// Least squares |L X - T|^2 + 1e-2 |Lap (X - T)|^2 + 1e-6 |X|^2, L the limit positions.
+    pub fn damped(&self, targets: &[Vec3]) -> Result<Vec<Vec3>, FitError> {
+        const DAMPING: f64 = 1e-2;
+        const TINY: f64 = 1e-6;
+        let n = targets.len();
+        let limit = self.coarse.limit_positions();
+        let bent = self.laplacian.apply(targets);
+        let mut triplets: Vec<Triplet<usize, usize, f64>> =
+            (0..n).map(|i| Triplet::new(i, i, TINY)).collect();
+        let mut right = Mat::<f64>::zeros(n, 3);
+        for (operator, weight, wanted) in [(&limit, 1.0, targets), (&self.laplacian, DAMPING, &bent[..])] {
+            for (r, target) in wanted.iter().enumerate() {
+                let (points, weights) = operator.row(r);
+                for (i, (&p, &wp)) in points.iter().zip(weights).enumerate() {
+                    for (&q, &wq) in points[i..].iter().zip(&weights[i..]) {
+                        triplets.push(Triplet::new(q as usize, p as usize, weight * wp * wq));
+                    }
+                    for a in 0..3 {
+                        right[(p as usize, a)] += weight * wp * target[a];
+                    }
+                }
+            }
+        }
+        let solver = |reason: String| FitError::Solver { round: 0, reason };
+        let matrix = SparseColMat::try_new_from_triplets(n, n, &triplets).map_err(|e| solver(format!("{e:?}")))?;
+        let llt = matrix.sp_cholesky(Side::Lower).map_err(|e| solver(format!("{e:?}")))?;
+        llt.solve_in_place(&mut right);
+        Ok((0..n).map(|i| Vec3::new(right[(i, 0)], right[(i, 1)], right[(i, 2)])).collect())
+    }
+
+    /// Area-weighted unit normals of the samples and the area that each stands for.
+    pub fn normals_and_areas(&self, at: &[Vec3]) -> (Vec<Vec3>, Vec<f64>) {
+        let mut normals = vec![Vec3::zeros(); at.len()];
+        let mut areas = vec![0.0; at.len()];
+        for quad in &self.fine.quads {
+            let [a, b, c, d] = quad.map(|v| at[v as usize]);
+            let normal = (c - a).cross(&(d - b)) / 2.0;
+            let area = normal.norm() / 4.0;
+            for v in quad {
+                normals[*v as usize] += normal;
+                areas[*v as usize] += area;
+            }
+        }
+        let unit = |n: Vec3| n.try_normalize(1e-12).unwrap_or_else(Vec3::zeros);
+        (normals.into_iter().map(unit).collect(), areas)
+    }
+
+    /// Triangles of the limit surface over the given samples.
+    pub fn triangle_mesh(&self, samples: Vec<Vec3>) -> TriMesh {
+        TriMesh { points: samples, triangles: self.triangles.clone(), tags: Vec::new() }
+    }
+
+    /// Volume inside the limit surface, mm3.
+    pub fn volume(&self, points: &[Vec3]) -> f64 {
+        self.triangle_mesh(self.samples.apply(points)).volume() * self.spacing.powi(3)
+    }
+
+    /// A position in mm.
+    pub fn to_mm(&self, p: &Vec3) -> Vec3 {
+        self.origin + self.spacing * p
+    }
+
+    /// The control mesh in mm.
+    pub fn control_mesh(&self, points: &[Vec3]) -> ControlMesh {
+        ControlMesh { points: points.iter().map(|p| self.to_mm(p)).collect(), quads: self.coarse.quads.clone() }
+    }
+}

@@ -1,0 +1,550 @@
+//! Catmull-Clark subdivision as sparse operators: one split, limit positions, limit tangents.
+//!
+//! All operators depend on the connectivity only, so a fit builds them once and applies them to
+//! every iterate.
+//!
+//! Sources: E. Catmull, J. Clark, "Recursively generated B-spline surfaces on arbitrary topological
+//! meshes", 1978, doi:10.1016/0010-4485(78)90110-0; limit masks from M. Halstead, M. Kass,
+//! T. DeRose, "Efficient, fair interpolation using Catmull-Clark surfaces", 1993,
+//! doi:10.1145/166117.166121.
+
+use std::f64::consts::PI;
+
+use super::ControlMesh;
+use crate::Vec3;
+use crate::mesh::TriMesh;
+
+/// Why a quad mesh cannot be subdivided; names the first offender.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CatmullClarkError {
+    /// A quad uses a point twice or a point that does not exist.
+    #[error("quad {quad} is degenerate or names a missing point")]
+    BadQuad {
+        /// Index of the quad.
+        quad: u32,
+    },
+    /// An edge is not used exactly once in each sense.
+    #[error("edge {edge:?} is not used exactly once in each sense")]
+    BadEdge {
+        /// The two point indices.
+        edge: [u32; 2],
+    },
+    /// The quads around a point form more than one fan.
+    #[error("point {point} is pinched: its quads form more than one fan")]
+    Pinched {
+        /// Index of the point.
+        point: u32,
+    },
+    /// More indices than 32 bits hold.
+    #[error("the refined mesh would have {count} points, more than {limit}")]
+    TooLarge {
+        /// Points of the refined mesh.
+        count: usize,
+        /// Largest number allowed.
+        limit: usize,
+    },
+}
+
+impl CatmullClarkError {
+    /// What the user can do about it.
+    pub fn hint(&self) -> Option<String> {
+        let text = match self {
+            Self::TooLarge { .. } => "use fewer levels or a coarser control mesh",
+            _ => "the control mesh must be closed, oriented and manifold",
+        };
+        Some(text.to_owned())
+    }
+}
+
+const LARGEST: usize = 200_000_000;
+
+/// Rows of weights over points: a sparse matrix in compressed row form, columns ascending in a row.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Stencils {
+    /// Number of points that the rows weigh (columns of the matrix).
+    pub columns: usize,
+    /// Start of each row in `indices` and `weights`; one more than rows.
+    pub offsets: Vec<usize>,
+    /// Point of each weight.
+    pub indices: Vec<u32>,
+    /// Weights.
+    pub weights: Vec<f64>,
+}
+
+impl Stencils {
+    /// No rows yet, over `columns` points.
+    pub fn new(columns: usize) -> Self {
+        Self {
+            columns,
+            offsets: vec![0],
+            indices: Vec::new(),
+            weights: Vec::new(),
+        }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// Points and weights of row `r`.
+    #[inline]
+    pub fn row(&self, r: usize) -> (&[u32], &[f64]) {
+        let range = self.offsets[r]..self.offsets[r + 1];
+        (&self.indices[range.clone()], &self.weights[range])
+    }
+
+    /// Appends a row; entries on the same point are added in the given order.
+    pub fn push(&mut self, entries: &mut Vec<(u32, f64)>) {
+        entries.sort_by_key(|e| e.0);
+        let start = self.indices.len();
+        for &(index, weight) in entries.iter() {
+            if self.indices.len() > start && self.indices.last() == Some(&index) {
+                if let Some(last) = self.weights.last_mut() {
+                    *last += weight;
+                }
+            } else {
+                self.indices.push(index);
+                self.weights.push(weight);
+            }
+        }
+        self.offsets.push(self.indices.len());
+    }
+
+    /// The weighted sums of `points`, one a row.
+    pub fn apply(&self, points: &[Vec3]) -> Vec<Vec3> {
+        (0..self.rows()).map(|r| self.apply_row(r, points)).collect()
+    }
+
+    /// The weighted sum of row `r`.
+    #[inline]
+    pub fn apply_row(&self, r: usize, points: &[Vec3]) -> Vec3 {
+        let (indices, weights) = self.row(r);
+        let mut sum = Vec3::zeros();
+        for (&i, &w) in indices.iter().zip(weights) {
+            sum += w * points[i as usize];
+        }
+        sum
+    }
+
+    /// The product `self * other`: applies `other` first.
+    pub fn after(&self, other: &Stencils) -> Stencils {
+        let mut product = Stencils::new(other.columns);
+        let mut value = vec![0.0; other.columns];
+        let mut seen = vec![false; other.columns];
+        let mut touched: Vec<u32> = Vec::new();
+        for r in 0..self.rows() {
+            let (middle, outer) = self.row(r);
+            for (&m, &a) in middle.iter().zip(outer) {
+                let (indices, weights) = other.row(m as usize);
+                for (&i, &w) in indices.iter().zip(weights) {
+                    if !seen[i as usize] {
+                        seen[i as usize] = true;
+                        touched.push(i);
+                    }
+                    value[i as usize] += a * w;
+                }
+            }
+            touched.sort_unstable();
+            for &i in &touched {
+                product.indices.push(i);
+                product.weights.push(value[i as usize]);
+                value[i as usize] = 0.0;
+                seen[i as usize] = false;
+            }
+            touched.clear();
+            product.offsets.push(product.indices.len());
+        }
+        product
+    }
+}
+
+/// Connectivity of a closed, oriented, manifold quad mesh. Half-edge `4 q + k` runs from corner `k`
+/// of quad `q` to the next corner.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct QuadTopology {
+    /// Number of points; points without quads are allowed.
+    pub point_count: usize,
+    /// The quads.
+    pub quads: Vec<[u32; 4]>,
+    /// Opposite half-edge of every half-edge.
+    pub twin: Vec<u32>,
+    /// One outgoing half-edge a point; `u32::MAX` without quads.
+    pub outgoing: Vec<u32>,
+    /// Number of quads at each point.
+    pub valence: Vec<u32>,
+}
+
+impl QuadTopology {
+    /// Checks the mesh and links its half-edges.
+    ///
+    /// # Errors
+    /// The first quad, edge or point that is not closed, oriented and manifold.
+    pub fn new(point_count: usize, quads: &[[u32; 4]]) -> Result<Self, CatmullClarkError> {
+        let count = point_count.saturating_add(quads.len().saturating_mul(3));
+        if count > LARGEST {
+            return Err(CatmullClarkError::TooLarge { count, limit: LARGEST });
+        }
+        let bad = |q: &[u32; 4]| {
+            (0..4).any(|k| q[k] as usize >= point_count || q[k + 1..].contains(&q[k]))
+        };
+        if let Some(quad) = quads.iter().position(bad) {
+            return Err(CatmullClarkError::BadQuad { quad: quad as u32 });
+        }
+        let mut topology = Self {
+            point_count,
+            quads: quads.to_vec(),
+            twin: link_half_edges(quads)?,
+            outgoing: vec![u32::MAX; point_count],
+            valence: vec![0; point_count],
+        };
+        for (q, quad) in quads.iter().enumerate() {
+            for (k, &v) in quad.iter().enumerate() {
+                topology.valence[v as usize] += 1;
+                if topology.outgoing[v as usize] == u32::MAX {
+                    topology.outgoing[v as usize] = (4 * q + k) as u32;
+                }
+            }
+        }
+        for v in 0..point_count as u32 {
+            if topology.ring(v).count() != topology.valence[v as usize] as usize {
+                return Err(CatmullClarkError::Pinched { point: v });
+            }
+        }
+        Ok(topology)
+    }
+
+    /// Outgoing half-edges of `v`, counter-clockwise seen from outside.
+    pub fn ring(&self, v: u32) -> impl Iterator<Item = u32> + '_ {
+        let first = self.outgoing[v as usize];
+        let mut next = (first != u32::MAX).then_some(first);
+        std::iter::from_fn(move || {
+            let here = next?;
+            let after = self.twin[previous(here) as usize];
+            next = (after != first).then_some(after);
+            Some(here)
+        })
+    }
+
+    /// The point at the end of half-edge `h`.
+    #[inline]
+    pub fn head(&self, h: u32) -> u32 {
+        self.quads[(h / 4) as usize][((h + 1) % 4) as usize]
+    }
+
+    /// The corner of the quad of `h` opposite to the start of `h`.
+    #[inline]
+    pub fn diagonal(&self, h: u32) -> u32 {
+        self.quads[(h / 4) as usize][((h + 2) % 4) as usize]
+    }
+
+    /// One half-edge an edge, ascending, and the edge of every half-edge.
+    pub fn edges(&self) -> (Vec<u32>, Vec<u32>) {
+        let mut edges = Vec::with_capacity(self.twin.len() / 2);
+        let mut edge_of = vec![0; self.twin.len()];
+        for h in 0..self.twin.len() as u32 {
+            let twin = self.twin[h as usize];
+            if h < twin {
+                edge_of[h as usize] = edges.len() as u32;
+                edge_of[twin as usize] = edges.len() as u32;
+                edges.push(h);
+            }
+        }
+        (edges, edge_of)
+    }
+
+    /// V - E + F over the points in use.
+    pub fn euler(&self) -> i64 {
+        let vertices = self.valence.iter().filter(|&&n| n > 0).count() as i64;
+        vertices - self.quads.len() as i64
+    }
+
+    /// One Catmull-Clark split: the operator and the refined connectivity.
+    ///
+    /// New points: the old ones, then one an edge, then one a quad. Quad `q` becomes quads
+    /// `4 q + k`, child `k` holding old corner `k` first.
+    pub fn split(&self) -> Result<(Stencils, QuadTopology), CatmullClarkError> {
+        let (edges, edge_of) = self.edges();
+        let mut split = Stencils::new(self.point_count);
+        let mut entries = Vec::new();
+        for v in 0..self.point_count as u32 {
+            entries.clear();
+            self.vertex_rule(v, &mut entries);
+            split.push(&mut entries);
+        }
+        for &h in &edges {
+            entries.clear();
+            let ends = [self.head(h), self.head(self.twin[h as usize])];
+            entries.extend(ends.map(|v| (v, 0.25)));
+            for side in [h, self.twin[h as usize]] {
+                let quad = self.quads[(side / 4) as usize];
+                entries.extend(quad.map(|v| (v, 0.0625)));
+            }
+            split.push(&mut entries);
+        }
+        for quad in &self.quads {
+            entries.clear();
+            entries.extend(quad.map(|v| (v, 0.25)));
+            split.push(&mut entries);
+        }
+        let edge_point = |h: usize| (self.point_count + edge_of[h] as usize) as u32;
+        let quad_point = |q: usize| (self.point_count + edges.len() + q) as u32;
+        let mut quads = Vec::with_capacity(4 * self.quads.len());
+        for (q, quad) in self.quads.iter().enumerate() {
+            for k in 0..4 {
+                let before = 4 * q + (k + 3) % 4;
+                quads.push([quad[k], edge_point(4 * q + k), quad_point(q), edge_point(before)]);
+            }
+        }
+        let refined = QuadTopology::new(split.rows(), &quads)?;
+        Ok((split, refined))
+    }
+
+    fn vertex_rule(&self, v: u32, entries: &mut Vec<(u32, f64)>) {
+        let n = f64::from(self.valence[v as usize]);
+        if n == 0.0 {
+            entries.push((v, 1.0));
+            return;
+        }
+        entries.push((v, (n - 2.0) / n));
+        for h in self.ring(v) {
+            entries.push((self.head(h), 1.0 / (n * n)));
+            let quad = self.quads[(h / 4) as usize];
+            entries.extend(quad.map(|w| (w, 0.25 / (n * n))));
+        }
+    }
+
+    /// Limit positions of the points.
+    pub fn limit_positions(&self) -> Stencils {
+        let mut limit = Stencils::new(self.point_count);
+        let mut entries = Vec::new();
+        for v in 0..self.point_count as u32 {
+            let n = f64::from(self.valence[v as usize]);
+            entries.clear();
+            if n == 0.0 {
+                entries.push((v, 1.0));
+            } else {
+                entries.push((v, n / (n + 5.0)));
+                for h in self.ring(v) {
+                    entries.push((self.head(h), 4.0 / (n * (n + 5.0))));
+                    entries.push((self.diagonal(h), 1.0 / (n * (n + 5.0))));
+                }
+            }
+            limit.push(&mut entries);
+        }
+        limit
+    }
+
+    /// Two independent limit tangents a point; their cross product points outward.
+    pub fn limit_tangents(&self) -> [Stencils; 2] {
+        [0.0, 1.0].map(|quarter| {
+            let mut tangents = Stencils::new(self.point_count);
+            let mut entries = Vec::new();
+            for v in 0..self.point_count as u32 {
+                entries.clear();
+                let n = f64::from(self.valence[v as usize]);
+                let c = (2.0 * PI / n).cos();
+                let a = 1.0 + c + (PI / n).cos() * (2.0 * (9.0 + c)).sqrt();
+                let wave = |i: f64| (2.0 * PI * i / n - quarter * PI / 2.0).cos();
+                for (i, h) in self.ring(v).enumerate() {
+                    let i = i as f64;
+                    entries.push((self.head(h), a * wave(i)));
+                    entries.push((self.diagonal(h), wave(i) + wave(i + 1.0)));
+                }
+                tangents.push(&mut entries);
+            }
+            tangents
+        })
+    }
+
+    /// Mean of the edge neighbours minus the point itself, one row a point.
+    pub fn laplacian(&self) -> Stencils {
+        let mut laplacian = Stencils::new(self.point_count);
+        let mut entries = Vec::new();
+        for v in 0..self.point_count as u32 {
+            entries.clear();
+            let n = f64::from(self.valence[v as usize]);
+            for h in self.ring(v) {
+                entries.push((self.head(h), 1.0 / n));
+            }
+            if n > 0.0 {
+                entries.push((v, -1.0));
+            }
+            laplacian.push(&mut entries);
+        }
+        laplacian
+    }
+}
+
+/// The half-edge before `h` in its quad.
+#[inline]
+fn previous(h: u32) -> u32 {
+    h / 4 * 4 + (h + 3) % 4
+}
+
+fn link_half_edges(quads: &[[u32; 4]]) -> Result<Vec<u32>, CatmullClarkError> {
+    let mut list: Vec<([u32; 2], bool, u32)> = Vec::with_capacity(4 * quads.len());
+    for (q, quad) in quads.iter().enumerate() {
+        for k in 0..4 {
+            let (a, b) = (quad[k], quad[(k + 1) % 4]);
+            list.push(([a.min(b), a.max(b)], a > b, (4 * q + k) as u32));
+        }
+    }
+    list.sort_unstable();
+    let mut twin = vec![u32::MAX; list.len()];
+    let mut at = 0;
+    while at < list.len() {
+        let edge = list[at].0;
+        let uses = list[at..].iter().take_while(|u| u.0 == edge).count();
+        if uses != 2 || list[at].1 == list[at + 1].1 {
+            return Err(CatmullClarkError::BadEdge { edge });
+        }
+        let (h, g) = (list[at].2, list[at + 1].2);
+        twin[h as usize] = g;
+        twin[g as usize] = h;
+        at += 2;
+    }
+    Ok(twin)
+}
+
+/// The operator from control points to limit positions after `levels` splits, and the refined
+/// connectivity. Quad `q` owns the refined quads `q * 4^levels ..`.
+///
+/// # Errors
+/// As [`QuadTopology::new`].
+pub fn limit_operator(
+    point_count: usize,
+    quads: &[[u32; 4]],
+    levels: u32,
+) -> Result<(Stencils, QuadTopology), CatmullClarkError> {
+    let mut topology = QuadTopology::new(point_count, quads)?;
+    let mut operator: Option<Stencils> = None;
+    for _ in 0..levels {
+        let (split, refined) = topology.split()?;
+        operator = Some(match operator {
+            Some(before) => split.after(&before),
+            None => split,
+        });
+        topology = refined;
+    }
+    let limit = topology.limit_positions();
+    let operator = match operator {
+        Some(before) => limit.after(&before),
+        None => limit,
+    };
+    Ok((operator, topology))
+}
+
+/// Triangles of the limit surface of `mesh` after `levels` splits (`2 * 4^levels` a quad, all
+/// points on the exact limit surface), and the control quad of each triangle.
+///
+/// # Errors
+/// As [`QuadTopology::new`].
+pub fn limit_mesh(mesh: &ControlMesh, levels: u32) -> Result<(TriMesh, Vec<u32>), CatmullClarkError> {
+    let mut topology = QuadTopology::new(mesh.points.len(), &mesh.quads)?;
+    let mut points = mesh.points.clone();
+    for _ in 0..levels {
+        let (split, refined) = topology.split()?;
+        points = split.apply(&points);
+        topology = refined;
+    }
+    let points = topology.limit_positions().apply(&points);
+    let (triangles, owner) = triangles_of(&topology.quads, levels);
+    Ok((TriMesh { points, triangles, tags: Vec::new() }, owner))
+}
+
+/// Two triangles a refined quad, and the control quad that each belongs to.
+pub fn triangles_of(quads: &[[u32; 4]], levels: u32) -> (Vec<[u32; 3]>, Vec<u32>) {
+    let mut triangles = Vec::with_capacity(2 * quads.len());
+    let mut owner = Vec::with_capacity(2 * quads.len());
+    for (q, &[a, b, c, d]) in quads.iter().enumerate() {
+        triangles.extend([[a, b, c], [a, c, d]]);
+        owner.extend([(q as u32) >> (2 * levels); 2]);
+    }
+    (triangles, owner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cube() -> ControlMesh {
+        let points = (0..8u32)
+            .map(|i| Vec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)))
+            .collect();
+        let quads = vec![
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        ControlMesh { points, quads }
+    }
+
+    #[test]
+    fn every_row_of_a_split_is_affine_and_keeps_the_topology() {
+        let cube = cube();
+        let topology = QuadTopology::new(8, &cube.quads).expect("a cube");
+        let (split, refined) = topology.split().expect("splits");
+        assert_eq!(topology.euler(), 2);
+        assert_eq!(refined.euler(), 2);
+        assert_eq!(refined.quads.len(), 24);
+        for operator in [split, topology.limit_positions()] {
+            for r in 0..operator.rows() {
+                let sum: f64 = operator.row(r).1.iter().sum();
+                assert!((sum - 1.0).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn splitting_does_not_move_the_limit() {
+        let cube = cube();
+        let (coarse, topology) = limit_operator(8, &cube.quads, 0).expect("limit");
+        let (fine, _) = limit_operator(8, &cube.quads, 3).expect("limit");
+        let (a, b) = (coarse.apply(&cube.points), fine.apply(&cube.points));
+        for v in 0..8 {
+            assert!((a[v] - b[v]).norm() < 1e-14);
+        }
+        assert_eq!(topology.valence, vec![3; 8]);
+    }
+
+    #[test]
+    fn limit_normals_point_outward_and_are_stable_under_splitting() {
+        let cube = cube();
+        let topology = QuadTopology::new(8, &cube.quads).expect("a cube");
+        let (split, refined) = topology.split().expect("splits");
+        let normals = |t: &QuadTopology, x: &[Vec3]| -> Vec<Vec3> {
+            let [u, v] = t.limit_tangents();
+            let (u, v) = (u.apply(x), v.apply(x));
+            u.iter().zip(&v).map(|(u, v)| u.cross(v).normalize()).collect()
+        };
+        let a = normals(&topology, &cube.points);
+        let b = normals(&refined, &split.apply(&cube.points));
+        for v in 0..8 {
+            assert!((a[v] - b[v]).norm() < 1e-12);
+            assert!(a[v].dot(&(cube.points[v] - Vec3::repeat(0.5))) > 0.0);
+        }
+    }
+
+    #[test]
+    fn limit_mesh_is_closed_and_owned() {
+        let (mesh, owner) = limit_mesh(&cube(), 2).expect("limit mesh");
+        assert_eq!(mesh.triangles.len(), 6 * 16 * 2);
+        assert_eq!(owner.iter().filter(|&&o| o == 5).count(), 32);
+        assert!(mesh.volume() > 0.2 && mesh.volume() < 1.0);
+        assert!(crate::mesh::Solid::try_from(mesh).is_ok());
+    }
+
+    #[test]
+    fn bad_meshes_are_refused_by_name() {
+        let mut open = cube();
+        open.quads.pop();
+        assert!(matches!(limit_mesh(&open, 1), Err(CatmullClarkError::BadEdge { .. })));
+        let mut degenerate = cube();
+        degenerate.quads[2][1] = degenerate.quads[2][0];
+        assert_eq!(limit_mesh(&degenerate, 1), Err(CatmullClarkError::BadQuad { quad: 2 }));
+    }
+}
