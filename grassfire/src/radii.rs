@@ -1,10 +1,27 @@
 //! Radii: medial radii mapped onto the skeleton and smoothed.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::medial::MedialMesh;
 use crate::skeleton::{PointGrid, Skeleton};
 
 /// Spheres that count for one skeleton point.
 const NEAREST: usize = 8;
+
+/// Options of the radii.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RadiiOptions {
+    /// Smoothing passes; 0 keeps the mapped radii.
+    pub smoothing: usize,
+}
+
+impl Default for RadiiOptions {
+    fn default() -> Self {
+        Self { smoothing: 2 }
+    }
+}
 
 /// Both sets of radii, so that an edit can be undone and re-applied; mm, one a point.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -274,6 +274,8 @@ pub struct NonDesignBlock {
     pub coverage: f64,
     /// It is in the solid as given.
     pub kept: bool,
+    /// Radii of its bores, mm.
+    pub bore_radii: Vec<f64>,
 }
 
 /// Time and memory of a stage.

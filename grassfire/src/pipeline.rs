@@ -1,0 +1,169 @@
+//! The whole chain, top to bottom: a proposal in, a checked CAD solid and a report out.
+//!
+//! A newcomer reads [`reconstruct`]: every stage is one call, its result one value that the next stage takes.
+
+mod bodies;
+mod deliver;
+mod error;
+mod illustrate;
+mod inputs;
+mod measure;
+mod record;
+mod shape;
+mod union;
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use error::{PipelineError, StageError};
+pub use shape::RetryOptions;
+
+use crate::cad::{CadOptions, NonDesignOptions};
+use crate::fit::FitOptions;
+use crate::io::ReadOptions;
+use crate::medial::{self, MedialOptions, PoleOptions};
+use crate::mesh::RepairOptions;
+use crate::monitor::Monitor;
+use crate::radii::RadiiOptions;
+use crate::remesh::RemeshOptions;
+use crate::report::{Report, ReportOptions};
+use crate::skeleton::SkeletonOptions;
+use crate::spline::{BrepOptions, PatchOptions, TessellateOptions};
+use crate::thicken::ThickenOptions;
+
+use deliver::Delivery;
+use record::Record;
+
+/// Options of all stages; each field is one table of the project file and one prefix of `--set`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ReconstructOptions {
+    /// Reading files.
+    pub read: ReadOptions,
+    /// Reading and rebuilding of the non-design bodies.
+    pub non_design: NonDesignOptions,
+    /// Repair of the input mesh.
+    pub repair: RepairOptions,
+    /// Voxel remesh and topological noise.
+    pub remesh: RemeshOptions,
+    /// Medial axis.
+    pub medial: MedialOptions,
+    /// Pole skeleton and wall thickness.
+    pub poles: PoleOptions,
+    /// Quad skeleton.
+    pub skeleton: SkeletonOptions,
+    /// Radii of the skeleton.
+    pub radii: RadiiOptions,
+    /// Thickening.
+    pub thicken: ThickenOptions,
+    /// Fit to the proposal.
+    pub fit: FitOptions,
+    /// What to do when a body cuts itself.
+    pub retry: RetryOptions,
+    /// G1 patches.
+    pub patches: PatchOptions,
+    /// Blocks and boundary representation.
+    pub brep: BrepOptions,
+    /// Tessellation of the limit surface.
+    pub tessellate: TessellateOptions,
+    /// CAD solid and its union with the non-design bodies.
+    pub cad: CadOptions,
+    /// Report and pictures.
+    pub report: ReportOptions,
+}
+
+/// One reconstruction: what to read, where to write, and how.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReconstructJob {
+    /// The proposal: mesh or density file.
+    pub part: PathBuf,
+    /// Bodies to unite with the result as they are (STEP or STL).
+    pub non_design: Vec<PathBuf>,
+    /// A quad skeleton drawn elsewhere, in place of ours.
+    pub skeleton: Option<PathBuf>,
+    /// Folder for all results; made when it does not exist.
+    pub output: PathBuf,
+    /// Options of all stages.
+    pub options: ReconstructOptions,
+}
+
+/// What a run gives back.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The report as written to `report.json`.
+    pub report: Report,
+    /// Checks that were not met, one line each; empty when all is well.
+    pub failed_checks: Vec<String>,
+}
+
+/// Turns a proposal into a checked CAD solid and a report.
+///
+/// 1. Reads the proposal and the non-design bodies; repairs the mesh.
+/// 2. Remeshes it on voxels to a closed solid and removes topological noise.
+/// 3. Computes wall thickness (poles) and the pruned medial axis.
+/// 4. Builds the quad skeleton (or reads the given one), maps and smooths its radii.
+/// 5. Thickens it and fits the limit surface to the proposal.
+/// 6. Builds the G1 faces and the boundary representation.
+/// 7. Builds the CAD solid, unites it with the non-design bodies, checks it.
+/// 8. Measures distance and volume, draws the pictures, writes the report.
+///
+/// Files are written as their stage ends, each atomically; nothing is written when the input is refused.
+///
+/// # Errors
+/// [`PipelineError`] names the stage and its cause. A result that was made but fails a check is not an error: see
+/// [`Outcome::failed_checks`].
+pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
+    let options = &job.options;
+    let mut record = Record::start("reconstruct");
+
+    let bodies = record.stage("non_design", || bodies::read(job, monitor))?;
+    let proposal = record.stage("read", || inputs::proposal(job, monitor))?;
+    let drawn = record.stage("read", || inputs::skeleton(job, monitor))?;
+    record.report.inputs = record.stage("read", || inputs::fingerprints(job, monitor))?;
+    record.report.input = Some(proposal.block());
+
+    let remeshed = record.stage("remesh", || inputs::remesh(&proposal, &bodies, options, monitor))?;
+    record.report.remesh = Some(measure::remesh_block(&remeshed));
+    let voxel = remeshed.field.spacing;
+    let delivery = record.stage("write", || Delivery::open(&job.output))?;
+    record.stage("write", || delivery.proposal(&remeshed.solid))?;
+
+    let poles = record.stage("poles", || medial::poles(&remeshed.solid, &options.poles, monitor))?;
+    record.stage("write", || delivery.poles(&poles, &remeshed.solid))?;
+    let axis = record.stage("medial", || medial::medial_axis(&remeshed.field, &options.medial, monitor))?;
+    record.stage("write", || delivery.medial(&axis.mesh))?;
+
+    let shape = shape::shape(&mut record, &axis, &remeshed, drawn.as_ref(), options, monitor)?;
+    record.report.topology = Some(measure::topology_block(&axis, &shape));
+    record.report.skeleton = Some(measure::skeleton_block(&axis, &shape));
+    record.report.body = Some(measure::body_block(&shape));
+    record.stage("write", || delivery.skeleton(&shape.skeleton.skeleton))?;
+    record.stage("write", || delivery.body(&shape.fitted.mesh))?;
+
+    let mesh = &shape.fitted.mesh;
+    let surface = record.stage("spline", || shape::surface(mesh, voxel, options, monitor))?;
+    record.stage("write", || delivery.stl("body.stl", &surface.tessellation.mesh))?;
+    let intersections = shape.fitted.self_intersections.len();
+    let part = record.stage("cad", || union::part(&surface, mesh, &bodies, intersections, voxel, options, monitor))?;
+    record.report.solid = part.block.clone();
+    record.report.non_design = part.non_design.clone();
+    record.stage("write", || union::deliver(&part, &product_name(&job.part), &delivery))?;
+
+    let deviation = record.stage("measure", || measure::deviation(&remeshed, &part, &bodies, monitor))?;
+    record.report.distance = Some(measure::distance_block(&deviation, &remeshed, &part));
+    record.report.volume = Some(measure::volume_block(&remeshed, &part));
+
+    let pictures = record.stage("pictures", || {
+        illustrate::pictures(&remeshed, &poles, &axis, &shape, &part, &options.report, monitor)
+    })?;
+    let failed_checks = record.finish(&options.report.limits, monitor);
+    delivery.report(&mut record.report, &pictures).map_err(|source| PipelineError { stage: "report", source })?;
+    Ok(Outcome { report: record.report, failed_checks })
+}
+
+/// Name of the product in the STEP file: the proposal's file name.
+fn product_name(part: &Path) -> String {
+    part.file_stem().map_or_else(|| "part".to_owned(), |stem| stem.to_string_lossy().into_owned())
+}

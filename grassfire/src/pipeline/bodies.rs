@@ -1,0 +1,95 @@
+//! The non-design bodies of a run, as solids for the union and as surfaces for measuring.
+
+use super::ReconstructJob;
+use super::error::StageError;
+use crate::Vec3;
+#[cfg(feature = "occt")]
+use crate::cad::{self, NonDesignBody};
+#[cfg(feature = "occt")]
+use crate::io::{self, Input};
+use crate::mesh::{Bvh, TriMesh};
+use crate::monitor::Monitor;
+use crate::remesh::Capsule;
+
+/// Chord (mm) and facet angle (radians) of the surfaces that distances are measured to.
+#[cfg(feature = "occt")]
+const CHORD: f64 = 0.02;
+#[cfg(feature = "occt")]
+const FACET: f64 = 0.2;
+
+/// All non-design bodies.
+#[derive(Default)]
+pub(super) struct Bodies {
+    /// Exact solids.
+    #[cfg(feature = "occt")]
+    pub(super) solids: Vec<NonDesignBody>,
+    /// Their surfaces, one mesh for all.
+    pub(super) surface: TriMesh,
+    /// Their bores with the length that is kept free.
+    pub(super) bores: Vec<Capsule>,
+}
+
+/// Tells whether a point belongs to the non-design region, where the proposal is not the reference.
+pub(super) struct Region<'a> {
+    nearest: Option<Bvh>,
+    bores: &'a [Capsule],
+    margin: f64,
+}
+
+impl Bodies {
+    /// The region within `margin` mm of the bodies or in one of their bores.
+    pub(super) fn region(&self, margin: f64) -> Region<'_> {
+        let nearest = (!self.surface.triangles.is_empty()).then(|| Bvh::new(&self.surface));
+        Region { nearest, bores: &self.bores, margin }
+    }
+}
+
+impl Region<'_> {
+    pub(super) fn contains(&self, p: &Vec3) -> bool {
+        let near = self.nearest.as_ref().is_some_and(|bvh| bvh.nearest(p, self.margin).is_some());
+        near || self.bores.iter().any(|bore| bore.contains(p))
+    }
+}
+
+/// Reads the non-design bodies of a job.
+#[cfg(feature = "occt")]
+pub(super) fn read(job: &ReconstructJob, monitor: &Monitor) -> Result<Bodies, StageError> {
+    let mut bodies = Bodies::default();
+    let options = &job.options.non_design;
+    for path in &job.non_design {
+        let solids = match io::read_input(path, &job.options.read, monitor)? {
+            Input::Step(path) => cad::read(&path, options, monitor)?,
+            Input::Mesh { mesh, .. } => {
+                let name = path.file_stem().map_or_else(|| "body".into(), |stem| stem.to_string_lossy());
+                cad::from_mesh(&name, &path.display().to_string(), &mesh, options, monitor)?
+            }
+            Input::Density { .. } => return Err(StageError::DensityBody { path: path.clone() }),
+        };
+        bodies.solids.extend(solids);
+    }
+    for body in &bodies.solids {
+        let surface = body.solid.tessellate(CHORD, FACET).map_err(cad::CadError::from)?;
+        let first = bodies.surface.points.len() as u32;
+        bodies.surface.points.extend(surface.points.iter().map(|p| Vec3::from(*p)));
+        bodies.surface.triangles.extend(surface.triangles.iter().map(|t| t.map(|v| v + first)));
+        bodies.bores.extend(body.bores.iter().map(kept_free));
+    }
+    Ok(bodies)
+}
+
+/// Without OpenCASCADE there is no union: a job with non-design bodies is refused.
+#[cfg(not(feature = "occt"))]
+pub(super) fn read(job: &ReconstructJob, _monitor: &Monitor) -> Result<Bodies, StageError> {
+    match job.non_design.first() {
+        Some(path) => Err(StageError::NoKernel { path: path.clone() }),
+        None => Ok(Bodies::default()),
+    }
+}
+
+/// The length of a bore that stays free of organic material.
+#[cfg(feature = "occt")]
+fn kept_free(bore: &cad::Bore) -> Capsule {
+    let at = |t: f64| bore.origin + t * bore.direction;
+    let [from, to] = bore.extent;
+    Capsule { a: at(from - bore.extension[0]), b: at(to + bore.extension[1]), radius: bore.radius }
+}

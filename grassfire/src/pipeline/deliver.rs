@@ -1,0 +1,105 @@
+//! The result folder: every file is written whole or not at all, and never mixes two runs.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::StageError;
+use crate::io::{self, IoError};
+use crate::medial::{MedialMesh, Poles};
+use crate::mesh::{Solid, TriMesh};
+use crate::report::{self, FileEntry, Picture, Report};
+use crate::skeleton::Skeleton;
+use crate::spline::ControlMesh;
+
+/// All files that a reconstruction may write, and what they hold.
+const FILES: [(&str, &str); 12] = [
+    ("part.step", "the solid, STEP AP242"),
+    ("part.stl", "the solid, triangles"),
+    ("body.obj", "closed quad control mesh of the body"),
+    ("body.stl", "limit surface of the body, triangles"),
+    ("skeleton.ply", "quad skeleton with radii, editable"),
+    ("medial.ma", "medial axis"),
+    ("poles.ply", "pole skeleton with radii"),
+    ("thickness.ply", "proposal with wall thickness"),
+    ("proposal.stl", "remeshed proposal"),
+    ("report.html", "report to read"),
+    ("report.json", "report for programs"),
+    ("manifest.json", "inputs, versions, times"),
+];
+
+/// The open result folder.
+pub(super) struct Delivery {
+    folder: PathBuf,
+}
+
+impl Delivery {
+    /// Makes the folder and takes away what an earlier run left in it.
+    pub(super) fn open(folder: &Path) -> Result<Self, IoError> {
+        let fail = |path: &Path, source| IoError::Write { file: path.display().to_string(), source };
+        std::fs::create_dir_all(folder).map_err(|e| fail(folder, e))?;
+        for (name, _) in FILES {
+            let path = folder.join(name);
+            if path.exists() {
+                std::fs::remove_file(&path).map_err(|e| fail(&path, e))?;
+            }
+        }
+        Ok(Self { folder: folder.to_owned() })
+    }
+
+    pub(super) fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    pub(super) fn proposal(&self, solid: &Solid) -> Result<(), IoError> {
+        io::write_stl(&self.path("proposal.stl"), solid.mesh())
+    }
+
+    pub(super) fn poles(&self, poles: &Poles, solid: &Solid) -> Result<(), IoError> {
+        let skeleton = TriMesh { points: poles.points.clone(), triangles: poles.triangles.clone(), tags: Vec::new() };
+        io::write_ply(&self.path("poles.ply"), &skeleton, Some(("radius", &poles.radii)))?;
+        io::write_ply(&self.path("thickness.ply"), solid.mesh(), Some(("thickness", &poles.thickness)))
+    }
+
+    pub(super) fn medial(&self, mesh: &MedialMesh) -> Result<(), IoError> {
+        io::write_medial(&self.path("medial.ma"), mesh)
+    }
+
+    pub(super) fn skeleton(&self, skeleton: &Skeleton) -> Result<(), IoError> {
+        io::write_skeleton(&self.path("skeleton.ply"), skeleton)
+    }
+
+    pub(super) fn body(&self, mesh: &ControlMesh) -> Result<(), IoError> {
+        io::write_control_mesh(&self.path("body.obj"), mesh)
+    }
+
+    pub(super) fn stl(&self, name: &str, mesh: &TriMesh) -> Result<(), IoError> {
+        io::write_stl(&self.path(name), mesh)
+    }
+
+    /// Report and manifest; the list of files is made from what lies in the folder.
+    pub(super) fn report(&self, report: &mut Report, pictures: &[Picture]) -> Result<(), StageError> {
+        let entry = |&(name, text): &(&str, &str)| {
+            let bytes = std::fs::metadata(self.path(name)).ok()?.len();
+            Some(FileEntry { path: name.to_owned(), text: text.to_owned(), bytes })
+        };
+        report.files = FILES.iter().filter_map(entry).collect();
+        report::write_html(&self.path("report.html"), report, pictures)?;
+        report::write_json(&self.path("report.json"), report)?;
+        Ok(self.manifest(report)?)
+    }
+
+    fn manifest(&self, report: &Report) -> Result<(), IoError> {
+        let manifest = json!({
+            "version": report.version,
+            "command": report.command,
+            "inputs": report.inputs,
+            "files": report.files,
+            "stages": report.stages,
+            "warnings": report.warnings,
+            "papers": report.papers,
+        });
+        let text = format!("{manifest:#}\n");
+        io::atomic_write(&self.path("manifest.json"), |out| out.write_all(text.as_bytes()))
+    }
+}

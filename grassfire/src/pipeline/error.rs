@@ -1,0 +1,112 @@
+//! The error of a run: which stage, and its own error.
+
+use std::path::PathBuf;
+
+use crate::cad::CadError;
+use crate::fit::FitError;
+use crate::io::IoError;
+use crate::medial::MedialError;
+use crate::mesh::RepairError;
+use crate::monitor::Cancelled;
+use crate::remesh::RemeshError;
+use crate::report::ReportError;
+use crate::skeleton::SkeletonError;
+use crate::spline::SplineError;
+use crate::thicken::ThickenError;
+
+/// A run that could not go on.
+#[derive(Debug, thiserror::Error)]
+#[error("{stage}")]
+pub struct PipelineError {
+    /// Stage that failed, as in `report.json`.
+    pub stage: &'static str,
+    /// Why.
+    pub source: StageError,
+}
+
+/// The error of one stage.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant is the error of the stage it is named after")]
+pub enum StageError {
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    #[error(transparent)]
+    Io(#[from] IoError),
+    #[error(transparent)]
+    Repair(#[from] RepairError),
+    #[error(transparent)]
+    Remesh(#[from] RemeshError),
+    #[error(transparent)]
+    Medial(#[from] MedialError),
+    #[error(transparent)]
+    Skeleton(#[from] SkeletonError),
+    #[error(transparent)]
+    Thicken(#[from] ThickenError),
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    #[error(transparent)]
+    Spline(#[from] SplineError),
+    #[error(transparent)]
+    Cad(#[from] CadError),
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    #[error("{} is a STEP file; the proposal must be a mesh or a density", path.display())]
+    StepProposal { path: PathBuf },
+    #[error("{} holds densities; a non-design body must be a STEP solid or a closed mesh", path.display())]
+    DensityBody { path: PathBuf },
+    #[error("{} cannot be united: this build has no OpenCASCADE", path.display())]
+    NoKernel { path: PathBuf },
+    #[error("retry.quad_sizes is empty: no quad size to try")]
+    NoQuadSize,
+}
+
+impl PipelineError {
+    /// Exit code of the command line: 2 bad input, 3 a stage failed, 130 cancelled.
+    pub fn exit_code(&self) -> u8 {
+        if self.is_cancelled() {
+            return 130;
+        }
+        match self.source {
+            StageError::Io(_) | StageError::Repair(_) | StageError::Remesh(_) => 2,
+            _ if matches!(self.stage, "read" | "non_design") => 2,
+            _ => 3,
+        }
+    }
+
+    /// A way out, where there is one.
+    pub fn hint(&self) -> Option<String> {
+        match &self.source {
+            StageError::Cancelled(_) => None,
+            StageError::Io(e) => e.hint(),
+            StageError::Repair(e) => e.hint(),
+            StageError::Remesh(e) => e.hint(),
+            StageError::Medial(e) => e.hint(),
+            StageError::Skeleton(e) => e.hint(),
+            StageError::Thicken(e) => e.hint(),
+            StageError::Fit(e) => e.hint(),
+            StageError::Spline(e) => e.hint(),
+            StageError::Cad(e) => e.hint(),
+            StageError::Report(e) => e.hint(),
+            StageError::StepProposal { .. } => Some("give the optimization result, and this file with --non-design".into()),
+            StageError::DensityBody { .. } => Some("export the body from CAD as STEP".into()),
+            StageError::NoKernel { .. } => Some("build with the default feature occt, or leave out --non-design".into()),
+            StageError::NoQuadSize => Some("give at least one factor, such as retry.quad_sizes=[1.0]".into()),
+        }
+    }
+
+    pub(super) fn is_cancelled(&self) -> bool {
+        matches!(
+            self.source,
+            StageError::Cancelled(_)
+                | StageError::Io(IoError::Cancelled(_))
+                | StageError::Repair(RepairError::Cancelled(_))
+                | StageError::Remesh(RemeshError::Cancelled(_))
+                | StageError::Medial(MedialError::Cancelled(_))
+                | StageError::Skeleton(SkeletonError::Cancelled(_))
+                | StageError::Thicken(ThickenError::Cancelled(_))
+                | StageError::Fit(FitError::Cancelled(_))
+                | StageError::Spline(SplineError::Cancelled(_))
+                | StageError::Cad(CadError::Cancelled(_))
+        )
+    }
+}

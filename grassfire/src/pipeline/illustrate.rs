@@ -1,0 +1,56 @@
+//! A picture of every stage, all from the same side.
+
+use rayon::prelude::*;
+
+use super::shape::Shape;
+use super::union::Part;
+use crate::medial::{MedialAxis, Poles};
+use crate::mesh::Bvh;
+use crate::monitor::Monitor;
+use crate::remesh::Remeshed;
+use crate::report::render::{RenderError, pictures::Studio};
+use crate::report::{Picture, ReportError, ReportOptions};
+
+type Shot<'a> = Box<dyn Fn(&Studio) -> Result<Picture, RenderError> + Sync + 'a>;
+
+/// Draws proposal, thickness, medial axis, skeleton, body, part and its deviation from the proposal.
+pub(super) fn pictures(
+    remeshed: &Remeshed,
+    poles: &Poles,
+    axis: &MedialAxis,
+    shape: &Shape,
+    part: &Part,
+    options: &ReportOptions,
+    monitor: &Monitor,
+) -> Result<Vec<Picture>, super::StageError> {
+    if !options.pictures {
+        return Ok(Vec::new());
+    }
+    monitor.step("pictures", "drawing", 0.0)?;
+    let proposal = remeshed.solid.mesh();
+    let studio = Studio::new(&proposal.points, options.picture_size());
+    let voxels = deviation(remeshed, part);
+    let bodies: Vec<u32> = (1..=part.non_design.len() as u32).collect();
+    let shots: Vec<Shot> = vec![
+        Box::new(|studio| studio.proposal(proposal)),
+        Box::new(|studio| studio.thickness(proposal, &poles.thickness)),
+        Box::new(|studio| studio.medial(&axis.mesh)),
+        Box::new(|studio| studio.skeleton(&shape.skeleton.skeleton)),
+        Box::new(|studio| studio.body(&shape.fitted.mesh)),
+        Box::new(|studio| studio.solid(&part.mesh, &bodies)),
+        Box::new(|studio| studio.error(&part.mesh, &voxels)),
+    ];
+    let drawn: Result<Vec<Picture>, RenderError> = shots.par_iter().map(|shot| shot(&studio)).collect();
+    Ok(drawn.map_err(ReportError::from)?)
+}
+
+/// Signed distance of every point of the part to the proposal, voxels; positive outside.
+fn deviation(remeshed: &Remeshed, part: &Part) -> Vec<f64> {
+    let field = &remeshed.field;
+    let nearest = Bvh::new(remeshed.solid.mesh());
+    let signed = |p: &crate::Vec3| {
+        let distance = nearest.nearest(p, f64::INFINITY).map_or(0.0, |hit| hit.distance);
+        -distance.copysign(field.sample(p)) / field.spacing
+    };
+    part.mesh.points.par_iter().map(signed).collect()
+}

@@ -1,0 +1,98 @@
+//! What a run reads: the proposal, the non-design bodies, a skeleton drawn elsewhere.
+
+use std::path::Path;
+
+use sha2::{Digest, Sha256};
+
+use super::bodies::Bodies;
+use super::error::StageError;
+use super::{ReconstructJob, ReconstructOptions};
+use crate::io::{self, Input, IoError};
+use crate::mesh::{Repair, RepairKind, RepairReport, TriMesh, repair};
+use crate::monitor::Monitor;
+use crate::remesh::{Remeshed, remesh_density};
+use crate::report::{InputBlock, InputFile, RepairEntry};
+use crate::skeleton::{self, Skeleton};
+use crate::voxel::VoxelGrid;
+
+/// The proposal as read and repaired.
+pub(super) enum Proposal {
+    Mesh { mesh: TriMesh, report: RepairReport },
+    Density { grid: VoxelGrid<f32>, report: RepairReport },
+}
+
+impl Proposal {
+    /// The `input` block of the report.
+    pub(super) fn block(&self) -> InputBlock {
+        let (Self::Mesh { report, .. } | Self::Density { report, .. }) = self;
+        let entry = |r: &Repair| RepairEntry { kind: kind_name(r.kind), count: r.count, text: r.text.clone() };
+        InputBlock {
+            triangles: report.triangles,
+            volume: report.volume,
+            open_edges: report.open_edges,
+            non_manifold_edges: report.non_manifold_edges,
+            components: report.components,
+            repairs: report.repairs.iter().map(entry).collect(),
+        }
+    }
+}
+
+/// Reads and repairs the proposal.
+pub(super) fn proposal(job: &ReconstructJob, monitor: &Monitor) -> Result<Proposal, StageError> {
+    let options = &job.options;
+    match io::read_input(&job.part, &options.read, monitor)? {
+        Input::Mesh { mesh, notes } => {
+            let mut repaired = repair(mesh, &options.repair, monitor)?;
+            repaired.report.repairs.splice(0..0, notes);
+            Ok(Proposal::Mesh { mesh: repaired.mesh, report: repaired.report })
+        }
+        Input::Density { grid, notes } => {
+            let cell = grid.spacing.powi(3);
+            let volume = grid.values.iter().map(|v| f64::from(*v)).sum::<f64>() * cell;
+            let report = RepairReport { volume, components: 1, repairs: notes, ..RepairReport::default() };
+            Ok(Proposal::Density { grid, report })
+        }
+        Input::Step(path) => Err(StageError::StepProposal { path }),
+    }
+}
+
+/// Reads the skeleton that the user drew, when there is one.
+pub(super) fn skeleton(job: &ReconstructJob, monitor: &Monitor) -> Result<Option<Skeleton>, StageError> {
+    let Some(path) = &job.skeleton else { return Ok(None) };
+    let drawn = io::read_skeleton(path, &job.options.read, monitor)?;
+    skeleton::check(&drawn)?;
+    Ok(Some(drawn))
+}
+
+/// Remeshes the proposal; the bores of the non-design bodies stay open.
+pub(super) fn remesh(
+    proposal: &Proposal,
+    bodies: &Bodies,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Remeshed, StageError> {
+    let mut remesh_options = options.remesh.clone();
+    remesh_options.keep_open.extend(bodies.bores.iter().copied());
+    Ok(match proposal {
+        Proposal::Mesh { mesh, .. } => crate::remesh::remesh(mesh, &remesh_options, monitor)?,
+        Proposal::Density { grid, .. } => remesh_density(grid, options.read.threshold, &remesh_options, monitor)?,
+    })
+}
+
+/// Name and SHA-256 of every file that a run reads.
+pub(super) fn fingerprints(job: &ReconstructJob, monitor: &Monitor) -> Result<Vec<InputFile>, StageError> {
+    let paths = std::iter::once(&job.part).chain(&job.non_design).chain(&job.skeleton);
+    paths.map(|path| fingerprint(path, monitor)).collect()
+}
+
+fn fingerprint(path: &Path, monitor: &Monitor) -> Result<InputFile, StageError> {
+    monitor.check()?;
+    let bytes = std::fs::read(path).map_err(|source| IoError::Open { file: path.display().to_string(), source })?;
+    let sha256 = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+    Ok(InputFile { path: path.display().to_string(), sha256 })
+}
+
+/// The kind as it stands in `report.json`.
+fn kind_name(kind: RepairKind) -> String {
+    serde_json::to_value(kind).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
+}

@@ -1,0 +1,141 @@
+//! From the medial axis to the fitted body and its faces, with another try when a body cuts itself.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ReconstructOptions;
+use super::error::{PipelineError, StageError};
+use super::record::Record;
+use crate::fit::{Fitted, fit};
+use crate::medial::MedialAxis;
+use crate::monitor::Monitor;
+use crate::radii;
+use crate::remesh::Remeshed;
+use crate::skeleton::{self, QuadSkeleton, Skeleton, quad_skeleton};
+use crate::spline::{
+    self, Brep, BrepOptions, ControlMesh, FaceMode, G1Report, Patch, SplineError, Tessellation, build_brep, patches, tessellate,
+};
+use crate::thicken::{ThickenedBody, thicken};
+
+/// What to do when the fitted body cuts itself or a stage fails on a skeleton.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RetryOptions {
+    /// Quad sizes to try in turn, as multiples of `skeleton.size_factor` (or `skeleton.quad_size`), until a body does
+    /// not cut itself. A skeleton drawn elsewhere is tried once.
+    pub quad_sizes: Vec<f64>,
+}
+
+impl Default for RetryOptions {
+    fn default() -> Self {
+        Self { quad_sizes: vec![1.0, 0.8, 1.25] }
+    }
+}
+
+/// The quad skeleton, the body thickened from it, and its fit to the proposal.
+pub(super) struct Shape {
+    pub(super) skeleton: QuadSkeleton,
+    pub(super) body: ThickenedBody,
+    pub(super) fitted: Fitted,
+}
+
+/// The smooth surface of the body.
+pub(super) struct Surface {
+    pub(super) patches: Vec<Patch>,
+    pub(super) g1: G1Report,
+    pub(super) brep: Brep,
+    pub(super) tessellation: Tessellation,
+}
+
+/// Skeleton, thickening and fit; the first body that does not cut itself wins, else the one that cuts itself least.
+pub(super) fn shape(
+    record: &mut Record,
+    axis: &MedialAxis,
+    remeshed: &Remeshed,
+    drawn: Option<&Skeleton>,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Shape, PipelineError> {
+    let sizes: &[f64] = if drawn.is_some() { &[1.0] } else { &options.retry.quad_sizes };
+    let mut best: Option<Shape> = None;
+    let mut failure = None;
+    for (attempt, &size) in sizes.iter().enumerate() {
+        match one_shape(record, axis, remeshed, drawn, size, options, monitor) {
+            Ok(shape) => {
+                let places = shape.fitted.self_intersections.len();
+                if places == 0 {
+                    return Ok(shape);
+                }
+                monitor.warn("fit", format!("try {}: the body cuts itself at {places} places (quad size x {size})", attempt + 1));
+                if best.as_ref().is_none_or(|b| places < b.fitted.self_intersections.len()) {
+                    best = Some(shape);
+                }
+            }
+            Err(error) if error.is_cancelled() => return Err(error),
+            Err(error) => {
+                monitor.warn(error.stage, format!("try {} (quad size x {size}) failed: {}", attempt + 1, error.source));
+                failure = Some(error);
+            }
+        }
+    }
+    match (best, failure) {
+        (Some(shape), _) => Ok(shape),
+        (None, Some(error)) => Err(error),
+        (None, None) => Err(PipelineError { stage: "skeleton", source: StageError::NoQuadSize }),
+    }
+}
+
+fn one_shape(
+    record: &mut Record,
+    axis: &MedialAxis,
+    remeshed: &Remeshed,
+    drawn: Option<&Skeleton>,
+    size: f64,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Shape, PipelineError> {
+    let mut skeleton = record.stage("skeleton", || match drawn {
+        Some(drawn) => Ok(adopt(drawn, axis)),
+        None => {
+            let mut sized = options.skeleton.clone();
+            sized.size_factor *= size;
+            sized.quad_size = sized.quad_size.map(|mm| mm * size);
+            quad_skeleton(&axis.mesh, remeshed.field.spacing, &sized, monitor)
+        }
+    })?;
+    radii::smooth(&mut skeleton.skeleton, options.radii.smoothing);
+    skeleton.stats = skeleton::stats(&skeleton.skeleton);
+    let body = record.stage("thicken", || thicken(&skeleton.skeleton, &options.thicken, monitor))?;
+    let fitted = record.stage("fit", || fit(&body, &skeleton.skeleton, &remeshed.field, &options.fit, monitor))?;
+    Ok(Shape { skeleton, body, fitted })
+}
+
+/// Takes a skeleton drawn elsewhere; radii that it does not have come from the medial axis.
+fn adopt(drawn: &Skeleton, axis: &MedialAxis) -> QuadSkeleton {
+    let mut skeleton = drawn.clone();
+    radii::map(&axis.mesh, &mut skeleton);
+    QuadSkeleton { topology: skeleton::topology(&skeleton), stats: skeleton::stats(&skeleton), skeleton }
+}
+
+/// Patches, B-rep and tessellation of a control mesh.
+pub(super) fn surface(
+    mesh: &ControlMesh,
+    voxel: f64,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Surface, SplineError> {
+    let patches = patches(mesh, &options.patches, monitor)?;
+    let g1 = spline::g1_max(mesh, &patches)?;
+    let brep = build_brep(mesh, &patches, &options.brep, monitor)?;
+    // A tenth of a voxel is well below what any figure of the report resolves.
+    let mut fine = options.tessellate;
+    fine.chord = fine.chord.min(0.1 * voxel);
+    let tessellation = tessellate(mesh, &patches, &fine)?;
+    Ok(Surface { patches, g1, brep, tessellation })
+}
+
+/// The same body with one face a quad, for booleans that fail on merged faces.
+#[cfg(feature = "occt")]
+pub(super) fn quads_brep(mesh: &ControlMesh, surface: &Surface, monitor: &Monitor) -> Result<Brep, SplineError> {
+    build_brep(mesh, &surface.patches, &BrepOptions { faces: FaceMode::Quads }, monitor)
+}

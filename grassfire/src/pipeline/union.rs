@@ -1,0 +1,112 @@
+//! The finished part: the CAD solid united with the non-design bodies or, without OpenCASCADE, the limit surface.
+
+use super::bodies::Bodies;
+use super::error::StageError;
+use super::shape::Surface;
+use super::{ReconstructOptions, deliver::Delivery};
+#[cfg(feature = "occt")]
+use crate::cad::{self, CadSolid, NonDesignResult, StepOptions};
+use crate::mesh::TriMesh;
+use crate::monitor::Monitor;
+use crate::report::{NonDesignBlock, SolidBlock};
+use crate::spline::ControlMesh;
+
+/// The finished part.
+pub(super) struct Part {
+    #[cfg(feature = "occt")]
+    solid: CadSolid,
+    /// Its triangles; tag 0 for the fitted body, 1 + index for non-design bodies.
+    pub(super) mesh: TriMesh,
+    /// Volume, mm3.
+    pub(super) volume: f64,
+    /// Distance of its non-design faces to the input CAD, mm; none without non-design bodies.
+    pub(super) non_design_max: Option<f64>,
+    /// Report block; none without a CAD solid.
+    pub(super) block: Option<SolidBlock>,
+    /// Report entries of the non-design bodies.
+    pub(super) non_design: Vec<NonDesignBlock>,
+}
+
+/// Chord of the part's triangles, voxels: well below what any figure of the report resolves.
+const CHORD: f64 = 0.05;
+
+/// Builds the CAD solid, unites it with the non-design bodies and checks it. `intersections` is how often the fitted
+/// body cuts itself: such a solid is never called valid, whatever the kernel says.
+#[cfg(feature = "occt")]
+pub(super) fn part(
+    surface: &Surface,
+    mesh: &ControlMesh,
+    bodies: &Bodies,
+    intersections: usize,
+    voxel: f64,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Part, StageError> {
+    let quads = || super::shape::quads_brep(mesh, surface, monitor).map_err(|e| e.to_string());
+    let mut solid = cad::build(&surface.brep, &bodies.solids, &options.cad, Some(&quads), monitor)?;
+    for message in &solid.messages {
+        monitor.warn("cad", message.clone());
+    }
+    if intersections > 0 {
+        solid.valid = false;
+        monitor.warn("cad", format!("the body cuts itself at {intersections} places, so the solid is not called valid"));
+    }
+    let block = SolidBlock {
+        valid: solid.valid,
+        bodies: solid.bodies,
+        faces: solid.faces,
+        volume: solid.volume,
+        area: solid.area,
+        genus: solid.genus,
+        g1_max: surface.g1.max_angle_deg.max(solid.g1_max),
+        shortest_edge: solid.shortest_edge,
+        max_tolerance: solid.max_tolerance,
+        volume_check: solid.volume_check,
+    };
+    let triangles = cad::tessellate(&solid, CHORD * voxel)?;
+    let non_design_max = solid.non_design.iter().map(|body| body.max_distance).reduce(f64::max);
+    let non_design = solid.non_design.iter().map(entry).collect();
+    Ok(Part { mesh: triangles, volume: solid.volume, non_design_max, block: Some(block), non_design, solid })
+}
+
+#[cfg(feature = "occt")]
+fn entry(body: &NonDesignResult) -> NonDesignBlock {
+    NonDesignBlock {
+        name: body.name.clone(),
+        source: body.source.clone(),
+        faces: body.faces,
+        coverage: body.coverage,
+        kept: body.kept,
+        bore_radii: body.bore_radii.clone(),
+    }
+}
+
+/// Writes `part.step` and `part.stl`.
+#[cfg(feature = "occt")]
+pub(super) fn deliver(part: &Part, product: &str, delivery: &Delivery) -> Result<(), StageError> {
+    let step = StepOptions { product: product.to_owned(), ..StepOptions::default() };
+    cad::write_step(&part.solid, &delivery.path("part.step"), &step)?;
+    Ok(delivery.stl("part.stl", &part.mesh)?)
+}
+
+/// Without OpenCASCADE the part is the limit surface of the body.
+#[cfg(not(feature = "occt"))]
+pub(super) fn part(
+    surface: &Surface,
+    _mesh: &ControlMesh,
+    _bodies: &Bodies,
+    _intersections: usize,
+    _voxel: f64,
+    _options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Part, StageError> {
+    monitor.warn("cad", "this build has no OpenCASCADE: body.obj, body.stl and part.stl are written, no STEP");
+    let mesh = TriMesh { tags: Vec::new(), ..surface.tessellation.mesh.clone() };
+    Ok(Part { mesh, volume: surface.brep.volume, non_design_max: None, block: None, non_design: Vec::new() })
+}
+
+/// Writes `part.stl`.
+#[cfg(not(feature = "occt"))]
+pub(super) fn deliver(part: &Part, _product: &str, delivery: &Delivery) -> Result<(), StageError> {
+    Ok(delivery.stl("part.stl", &part.mesh)?)
+}
