@@ -51,9 +51,9 @@ pub fn medial_axis(field: &VoxelGrid<f32>, options: &MedialOptions, monitor: &Mo
     if samples.is_empty() {
         return Err(MedialError::Empty);
     }
-    let solid = voxels.betti(chi);
+    let (solid, triangulation) = rayon::join(|| voxels.betti(chi), || delaunay_lattice(&samples, monitor));
     let mut complex = {
-        let triangulation = delaunay_lattice(&samples, monitor)?;
+        let triangulation = triangulation?;
         monitor.step(STAGE, "Voronoi complex", 0.4)?;
         Complex::build(&triangulation, &samples, &voxels)
     };
@@ -98,13 +98,15 @@ fn prune(
     options: &MedialOptions,
     monitor: &Monitor,
 ) -> Result<(Alive, Vec<u32>), MedialError> {
-    monitor.step(STAGE, "erosion thickness", 0.5)?;
-    let (times, _) = burn(complex, spheres, &mut Alive::all(complex), |_| f32::INFINITY, monitor)?;
-    monitor.step(STAGE, "pruning", 0.65)?;
-    let radius = |f: u32| spheres.radii[f as usize];
-    let limit = |f: u32| options.sheet_limit(radius(f));
+    monitor.step(STAGE, "burning", 0.5)?;
+    let limit = |f: u32| options.sheet_limit(spheres.radii[f as usize]);
     let mut alive = Alive::all(complex);
-    let (_, collapses) = burn(complex, spheres, &mut alive, limit, monitor)?;
+    let (full, pruning) = rayon::join(
+        || burn(complex, spheres, &mut Alive::all(complex), |_| f32::INFINITY, monitor),
+        || burn(complex, spheres, &mut alive, limit, monitor),
+    );
+    let (times, collapses) = (full?.0, pruning?.1);
+    monitor.step(STAGE, "sheets", 0.75)?;
     let ribbon = ribbons(complex, spheres, &alive, &times, options);
     burn(complex, spheres, &mut alive, only(&ribbon), monitor)?;
     regrow(complex, spheres, samples, &times, &mut alive, &collapses, options.regrow_sine);
@@ -112,8 +114,8 @@ fn prune(
     let island = islands(complex, spheres, &alive, options);
     burn(complex, spheres, &mut alive, only(&island), monitor)?;
     monitor.step(STAGE, "curves", 0.85)?;
-    let report = prune_curves(complex, &mut alive, |r| options.curve_limit(r));
-    Ok((alive, report.points))
+    let points = prune_curves(complex, &mut alive, |r| options.curve_limit(r), |r| options.tip_limit(r));
+    Ok((alive, points))
 }
 
 /// Faces of sheets that are nowhere thicker than `ribbon_ratio` times their radius.

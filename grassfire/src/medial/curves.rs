@@ -12,17 +12,10 @@ struct Burnt {
     /// The end that burnt first.
     outer: u32,
     branch: u32,
+    /// Erosion thickness at the inner end is above the limit for tips.
+    solid: bool,
     /// The whole component ends here: nothing of it is left.
     last: bool,
-}
-
-/// What [`prune_curves`] did.
-#[derive(Debug, Default)]
-pub(super) struct CurveReport {
-    /// Edges taken away.
-    pub(super) removed: usize,
-    /// Edges kept although short, one a component that would have shrunk to a point.
-    pub(super) points: Vec<u32>,
 }
 
 /// Removes dangling curves whose erosion thickness is small.
@@ -33,28 +26,30 @@ pub(super) struct CurveReport {
 /// 2. A branch is significant when its erosion thickness at its root exceeds `limit(radius there)`.
 ///    Judging at the root, not edge by edge from the tip, is what keeps lattice zig-zag at the tips
 ///    from blocking the fire.
-/// 3. Keep significant branches and whatever carries something kept. A component that would vanish
-///    keeps one edge.
-pub(super) fn prune_curves(complex: &Complex, alive: &mut Alive, limit: impl Fn(f32) -> f32) -> CurveReport {
-    let (burnt, significant) = burn_curves(complex, alive, limit);
+/// 3. Keep significant branches without their outermost part, where the thickness is below
+///    `tip_limit(radius there)` (a spur to the surface), and whatever carries something kept. A
+///    component that would vanish keeps one edge.
+///
+/// Returns the edges kept for that reason.
+pub(super) fn prune_curves(complex: &Complex, alive: &mut Alive, limit: impl Fn(f32) -> f32, tip_limit: impl Fn(f32) -> f32) -> Vec<u32> {
+    let (burnt, significant) = burn_curves(complex, alive, limit, tip_limit);
     let mut carries = vec![false; complex.radii.len()];
-    let mut report = CurveReport::default();
+    let mut points = Vec::new();
     for b in &burnt {
-        let forced = b.last && !significant[b.branch as usize] && !carries[b.outer as usize];
-        if forced {
-            report.points.push(b.edge);
+        let kept = carries[b.outer as usize] || (b.solid && significant[b.branch as usize]);
+        if !kept && b.last {
+            points.push(b.edge);
         }
-        if forced || significant[b.branch as usize] || carries[b.outer as usize] {
+        if kept || b.last {
             complex.edges[b.edge as usize].iter().for_each(|&v| carries[v as usize] = true);
         } else {
             alive.edges[b.edge as usize] = false;
-            report.removed += 1;
         }
     }
-    report
+    points
 }
 
-fn burn_curves(complex: &Complex, alive: &Alive, limit: impl Fn(f32) -> f32) -> (Vec<Burnt>, Vec<bool>) {
+fn burn_curves(complex: &Complex, alive: &Alive, limit: impl Fn(f32) -> f32, tip_limit: impl Fn(f32) -> f32) -> (Vec<Burnt>, Vec<bool>) {
     let is_curve: Vec<bool> =
         (0..complex.edges.len() as u32).map(|e| alive.edges[e as usize] && alive.faces_at(complex, e).next().is_none()).collect();
     let mut left = is_curve.clone();
@@ -93,7 +88,8 @@ fn burn_curves(complex: &Complex, alive: &Alive, limit: impl Fn(f32) -> f32) -> 
         left[edge as usize] = false;
         degree[o] -= 1;
         degree[i] -= 1;
-        burnt.push(Burnt { edge, outer, branch, last: degree[i] == 0 });
+        let solid = time - complex.radii[i] > tip_limit(complex.radii[i]);
+        burnt.push(Burnt { edge, outer, branch, solid, last: degree[i] == 0 });
         if degree[i] == 1 && at.edges(inner).iter().any(|&e| left[e as usize]) {
             branch_of[i] = branch;
             front.push(key(time, inner));

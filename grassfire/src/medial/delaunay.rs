@@ -20,7 +20,7 @@ const SMALLEST: f64 = 1e-40;
 /// A tetrahedron of a [`Delaunay`] triangulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tet {
-    /// Indices of the input points; seen from the last one the first three run counter-clockwise.
+    /// Indices of the input points; seen from the last one the first three run clockwise.
     pub vertices: [u32; 4],
     /// Behind the facet opposite vertex k: four times the neighbour plus its own facet number there, or [`NONE`].
     pub mates: [u32; 4],

@@ -6,6 +6,7 @@ mod complex;
 mod curves;
 mod delaunay;
 mod options;
+mod poles;
 mod predicates;
 mod refit;
 mod spatial_order;
@@ -15,6 +16,7 @@ mod voxel_solid;
 pub use axis::medial_axis;
 pub use delaunay::{Delaunay, NONE, Tet, delaunay, delaunay_lattice};
 pub use options::{MedialError, MedialOptions};
+pub use poles::{PoleOptions, Poles, poles};
 
 use crate::Vec3;
 use crate::topology::Betti;

@@ -25,6 +25,8 @@ pub struct MedialOptions {
     pub curve_noise: f64,
     /// Least erosion thickness of a dangling curve at its root as a multiple of the radius there.
     pub curve_ratio: f64,
+    /// A kept dangling curve ends where its erosion thickness is this multiple of the radius (at least a voxel).
+    pub tip_ratio: f64,
     /// Weight of the old sphere against its surface planes when spheres are refitted.
     pub refit_rest: f64,
     /// Longest move of a sphere's centre in voxels when it is refitted.
@@ -41,6 +43,7 @@ impl Default for MedialOptions {
             island_ratio: 3.0,
             curve_noise: 4.0,
             curve_ratio: 1.2,
+            tip_ratio: 0.25,
             refit_rest: 0.3,
             refit_move: 1.5,
         }
@@ -58,6 +61,11 @@ impl MedialOptions {
         (self.curve_noise as f32).max(self.curve_ratio as f32 * r)
     }
 
+    /// Erosion thickness (voxels) where a kept dangling curve of radius `r` (voxels) ends.
+    pub(super) fn tip_limit(&self, r: f32) -> f32 {
+        (self.tip_ratio as f32 * r).max(1.0)
+    }
+
     pub(super) fn check(&self) -> Result<(), MedialError> {
         let options = [
             ("sheet_noise", self.sheet_noise),
@@ -67,6 +75,7 @@ impl MedialOptions {
             ("island_ratio", self.island_ratio),
             ("curve_noise", self.curve_noise),
             ("curve_ratio", self.curve_ratio),
+            ("tip_ratio", self.tip_ratio),
             ("refit_rest", self.refit_rest),
             ("refit_move", self.refit_move),
         ];
