@@ -1,6 +1,7 @@
 //! Voxel remesh: soup in, closed solid and signed distance field out, topological noise removed.
 
 mod compose;
+mod crossings;
 mod deviation;
 mod digital;
 mod error;
@@ -27,6 +28,10 @@ use crate::voxel::VoxelGrid;
 use digital::VoxelSet;
 
 const STAGE: &str = "remesh";
+/// Longest edge of the triangles in the search tree, voxels.
+const PIECE: f64 = 4.0;
+/// Triangles in the search tree beyond which no more are split.
+const PIECES: usize = 2_000_000;
 
 /// What kind of topological noise was removed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -75,7 +80,7 @@ pub struct Remeshed {
 ///
 /// 1. Voxel edge: `options.voxel` or [`default_voxel`].
 /// 2. Signed distance: exact near the surface, sign by the generalized winding number (> 1/2 is inside), propagated
-///    beyond; a light Gaussian filter.
+///    beyond; a light Gaussian filter that keeps the volume.
 /// 3. Topological noise narrower than `options.min_tunnel` is removed by named changes; nothing else changes topology.
 /// 4. Dual contouring gives a closed manifold surface with exactly the topology of the voxel set.
 ///
@@ -180,6 +185,8 @@ fn remesh_on(mesh: &TriMesh, source: Option<f64>, options: &RemeshOptions, monit
         return Err(RemeshError::Empty);
     }
     let (origin, dims) = resolution::layout(&lo, &hi, voxel, options.max_voxels)?;
+    let fine = split_long_edges(mesh, PIECE * voxel);
+    let bvh = Bvh::new(&fine);
     let mut field = signed_distance::signed_distance(mesh, &bvh, origin, voxel, dims, monitor)?;
     if !field.values.iter().any(|&v| v > 0.0) {
         return Err(not_solid(&bvh, &field));
@@ -210,9 +217,31 @@ fn remesh_on(mesh: &TriMesh, source: Option<f64>, options: &RemeshOptions, monit
         return Err(RemeshError::Topology { surface: solid.euler(), voxels: after.chi });
     }
     monitor.step(STAGE, "distance", 0.95)?;
-    let distance_max = deviation::deviation(mesh, &bvh, &solid, &field, &noise.touched, options.samples);
+    let distance_max = deviation::deviation(&fine, &bvh, &solid, &field, &noise.touched, options.samples);
     noise.changes.sort_by(|a, b| b.size.total_cmp(&a.size));
     Ok(Remeshed { solid, field, genus_before: noise.before.b1, genus_after: after.b1, changes: noise.changes, distance_max })
+}
+
+/// Halves the longest edge of every triangle until it is at most `length`: long triangles make poor boxes, and every
+/// query would visit most of them. Neighbours are split at the same points.
+fn split_long_edges(mesh: &TriMesh, length: f64) -> TriMesh {
+    let mut out = TriMesh { points: mesh.points.clone(), ..TriMesh::default() };
+    let mut stack = mesh.triangles.clone();
+    stack.reverse();
+    while let Some(t) = stack.pop() {
+        let edge = |k: usize| (out.points[t[k] as usize] - out.points[t[(k + 1) % 3] as usize]).norm();
+        let longest = (0..3).max_by(|&a, &b| edge(a).total_cmp(&edge(b))).unwrap_or(0);
+        if edge(longest) <= length || out.triangles.len() + stack.len() >= PIECES {
+            out.triangles.push(t);
+            continue;
+        }
+        let [a, b, c] = [t[longest], t[(longest + 1) % 3], t[(longest + 2) % 3]];
+        let middle = out.points.len() as u32;
+        out.points.push((out.points[a as usize] + out.points[b as usize]) / 2.0);
+        stack.push([middle, b, c]);
+        stack.push([a, middle, c]);
+    }
+    out
 }
 
 /// The winding numbers say why nothing is inside.

@@ -70,7 +70,7 @@ pub(super) fn insert(
         if patch.reach <= 0.0 {
             patch.reach = wall(grid, set, patch, sign);
         }
-        patch.reach = patch.reach.clamp(h, (width / 2.0).max(h));
+        patch.reach = patch.reach.clamp(h, (width / 3.0).max(h));
         raise(grid, patch, &mut plate, &mut region);
     }
     region.retain(|&v| !set.on_border(v) && !kept.get(v as usize).copied().unwrap_or(false));
@@ -91,7 +91,8 @@ pub(super) fn insert(
     }
 }
 
-/// Half thickness of the wall around the membrane: the depths of its voxels are spread evenly from 0 to that.
+/// Half thickness of the wall around the membrane: the depths of its voxels are spread evenly from 0 to that, so it is
+/// twice their median.
 fn wall(grid: &VoxelGrid<f32>, set: &VoxelSet, patch: &Patch, sign: f32) -> f64 {
     let mut depths = Vec::new();
     for &v in &patch.voxels {
@@ -107,7 +108,7 @@ fn wall(grid: &VoxelGrid<f32>, set: &VoxelSet, patch: &Patch, sign: f32) -> f64 
         return 0.0;
     }
     depths.sort_by(f32::total_cmp);
-    f64::from(depths[(depths.len() - 1) * 3 / 4]) / 0.75
+    2.0 * f64::from(depths[depths.len() / 2])
 }
 
 /// Calls `visit` with the index and the distance (voxels) of every voxel of the cube of half-side `reach` about `v`.

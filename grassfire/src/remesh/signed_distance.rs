@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
+use super::crossings::sign_by_rows;
 use super::{RemeshError, STAGE};
 use crate::Vec3;
 use crate::mesh::TriMesh;
@@ -19,13 +20,12 @@ const INSIDE: f64 = 0.5 + 1e-4;
 /// Edge of the blocks that get one sign where no surface is near, voxels.
 const BLOCK: usize = 4;
 
-/// Signed distance (mm, positive inside) on `grid`'s lattice.
+/// Signed distance (mm, positive inside) of `mesh`; `bvh` holds the same surface.
 ///
 /// 1. Voxels within 3 voxels of a triangle get their exact distance from the tree.
 /// 2. Sign: winding number > 1/2. When the triangles close up exactly (every edge used as often forward as backward)
-///    the winding number is constant off the surface, so voxels a voxel away from it take the sign of their component
-///    and only the layer next to the surface is evaluated. Otherwise the whole band is evaluated, and beyond it blocks
-///    of 4^3 voxels, subdivided where the sign is not clear.
+///    it is counted along grid rows. Otherwise the generalized winding number is evaluated in the whole band, and
+///    beyond it for blocks of 4^3 voxels, subdivided where the sign is not clear.
 /// 3. Beyond the band the distance is propagated by fast sweeping.
 pub(super) fn signed_distance(
     mesh: &TriMesh,
@@ -40,11 +40,10 @@ pub(super) fn signed_distance(
     mark_band(bvh, &mut grid);
     exact_distances(bvh, &mut grid);
     monitor.step(STAGE, "inside or outside", 0.3)?;
-    let winding = Winding::new(bvh);
     if closes_up(mesh) {
-        sign_by_components(&winding, &mut grid);
+        sign_by_rows(mesh, &mut grid);
     } else {
-        sign_by_blocks(&winding, &mut grid);
+        sign_by_blocks(&Winding::new(bvh), &mut grid);
     }
     monitor.step(STAGE, "far field", 0.5)?;
     let known: Vec<bool> = grid.values.par_iter().map(|v| v.is_finite()).collect();
@@ -134,42 +133,6 @@ fn closes_up(mesh: &TriMesh) -> bool {
     }
     edges.par_sort_unstable();
     edges.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)).all(|group| group.iter().map(|e| i64::from(e.2)).sum::<i64>() == 0)
-}
-
-/// Signs for a soup that closes up. Leaves the far voxels at +-infinity.
-fn sign_by_components(winding: &Winding, grid: &mut VoxelGrid<f32>) {
-    let h = grid.spacing as f32;
-    sign_each(winding, grid, |value| value < h);
-    // Voxels at least a voxel away from the surface: no triangle between face neighbours, one sign a component.
-    let [nx, ny, nz] = grid.dims;
-    let mut done = vec![false; grid.values.len()];
-    let mut queue: Vec<u32> = Vec::new();
-    for start in 0..grid.values.len() {
-        if done[start] || grid.values[start].abs() < h {
-            continue;
-        }
-        let [i, j, k] = grid.ijk(start);
-        let sign = if winding.at(&grid.centre(i, j, k)) > INSIDE { 1.0 } else { -1.0 };
-        done[start] = true;
-        queue.push(start as u32);
-        while let Some(v) = queue.pop() {
-            let v = v as usize;
-            let [i, j, k] = grid.ijk(v);
-            let mut visit = |inside: bool, n: usize| {
-                if inside && !done[n] && grid.values[n].abs() >= h {
-                    done[n] = true;
-                    queue.push(n as u32);
-                }
-            };
-            visit(i > 0, v.wrapping_sub(1));
-            visit(i + 1 < nx, v + 1);
-            visit(j > 0, v.wrapping_sub(nx));
-            visit(j + 1 < ny, v + nx);
-            visit(k > 0, v.wrapping_sub(nx * ny));
-            visit(k + 1 < nz, v + nx * ny);
-            grid.values[v] *= sign;
-        }
-    }
 }
 
 /// Gives every voxel whose (unsigned) value satisfies `wanted` the sign of its winding number.
