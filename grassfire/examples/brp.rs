@@ -24,7 +24,7 @@ fn main() {
         let te = tessellate(&m, &pt, &TessellateOptions::default()).unwrap();
         let t4 = t.elapsed();
         println!("{p} quads {} faces {} edges {} vertices {} shells {} volume {} area {} patches {t1:?} brep {:?} g1 {:?} {:?} tess {} tris {:?} tess volume {} {:?}", m.quads.len(), b.faces.len(), b.edges.len(), b.vertices.len(), b.shells.len(), b.volume, area(&pt), t2 - t1, t3 - t2, g, te.mesh.triangles.len(), t4 - t3, te.mesh.volume(), mon.warnings());
-        println!("   spans max {:?} faces>4 edges {}  fold {:?}", b.faces.iter().map(|f| f.spans).max_by_key(|s| s[0] * s[1]), b.faces.iter().filter(|f| f.uses.len() > 4).count(), worst_fold(&pt, 0.05));
+        println!("   spans max {:?} faces>4 edges {}", b.faces.iter().map(|f| f.spans).max_by_key(|s| s[0] * s[1]), b.faces.iter().filter(|f| f.uses.len() > 4).count());
         println!("   solid {:?}", grassfire::mesh::Solid::try_from(te.mesh.clone()).map(|s| s.euler()));
         let mut o = String::new();
         writeln!(o, "{} {} {} {}", b.vertices.len(), b.edges.len(), b.faces.len(), b.volume).unwrap();

@@ -26,6 +26,38 @@ pub fn evaluate(patch: &Patch, u: f64, v: f64) -> SurfacePoint {
     SurfacePoint { position: blend(patch, &bu, &bv), du, dv, normal }
 }
 
+/// Basis polynomials and their derivatives at one parameter.
+pub(super) type Basis = ([f64; 6], [f64; 6]);
+
+/// Basis polynomials and their derivatives at `t`.
+pub(super) fn basis(t: f64) -> Basis {
+    (bernstein(t), bernstein_slope(t))
+}
+
+/// Calls `visit(i, j, position, du, dv)` on the grid of all pairs of parameters given by their basis; cheaper than
+/// single points.
+pub(super) fn visit_grid(patch: &Patch, table: &[Basis], mut visit: impl FnMut(usize, usize, Vec3, Vec3, Vec3)) {
+    for (i, (value_u, slope_u)) in table.iter().enumerate() {
+        let mut line = [Vec3::zeros(); 6];
+        let mut line_du = [Vec3::zeros(); 6];
+        for (row, (x, dx)) in patch.control.iter().zip(value_u.iter().zip(slope_u)) {
+            for (j, point) in row.iter().enumerate() {
+                line[j] += point * *x;
+                line_du[j] += point * *dx;
+            }
+        }
+        for (j, (value_v, slope_v)) in table.iter().enumerate() {
+            let (mut x, mut du, mut dv) = (Vec3::zeros(), Vec3::zeros(), Vec3::zeros());
+            for k in 0..6 {
+                x += line[k] * value_v[k];
+                du += line_du[k] * value_v[k];
+                dv += line[k] * slope_v[k];
+            }
+            visit(i, j, x, du, dv);
+        }
+    }
+}
+
 /// Second derivatives uu, uv, vv of `patch` at (u, v).
 pub(super) fn second_derivatives(patch: &Patch, u: f64, v: f64) -> [Vec3; 3] {
     let (bu, bv) = (bernstein(u), bernstein(v));
@@ -50,13 +82,13 @@ fn blend(patch: &Patch, along_u: &[f64; 6], along_v: &[f64; 6]) -> Vec3 {
 }
 
 /// Bernstein polynomials of degree 5.
-pub(super) fn bernstein(t: f64) -> [f64; 6] {
+fn bernstein(t: f64) -> [f64; 6] {
     let low: [f64; 5] = raise(&bernstein3(t), t);
     raise(&low, t)
 }
 
 /// First derivatives of the Bernstein polynomials of degree 5.
-pub(super) fn bernstein_slope(t: f64) -> [f64; 6] {
+fn bernstein_slope(t: f64) -> [f64; 6] {
     let low: [f64; 5] = raise(&bernstein3(t), t);
     differences(&low).map(|x| 5.0 * x)
 }

@@ -26,8 +26,8 @@ pub enum SplineError {
         /// Number of points.
         points: usize,
     },
-    /// A coordinate is infinite or not a number.
-    #[error("point {point} has a coordinate that is not a finite number")]
+    /// A coordinate is infinite, not a number or beyond 1e12 mm.
+    #[error("point {point} has a coordinate that is not a number of at most 1e12 mm")]
     NotFinite {
         /// Index of the point.
         point: usize,

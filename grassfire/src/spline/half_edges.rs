@@ -119,13 +119,14 @@ impl HalfEdges {
 
 fn check_quads(mesh: &ControlMesh) -> Result<(), SplineError> {
     const LIMIT: usize = 1 << 28;
+    const LARGEST: f64 = 1e12;
     if mesh.quads.is_empty() {
         return Err(SplineError::Empty);
     }
     if mesh.quads.len() > LIMIT {
         return Err(SplineError::TooLarge { quads: mesh.quads.len(), limit: LIMIT });
     }
-    if let Some(point) = mesh.points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+    if let Some(point) = mesh.points.iter().position(|p| !p.iter().all(|x| x.abs() <= LARGEST)) {
         return Err(SplineError::NotFinite { point });
     }
     for (quad, corners) in mesh.quads.iter().enumerate() {
@@ -211,9 +212,11 @@ mod tests {
         let mut mesh = cube();
         mesh.quads[3][2] = 9;
         assert_eq!(error(&mesh), SplineError::MissingPoint { quad: 3, point: 9, points: 8 });
-        let mut mesh = cube();
-        mesh.points[5].y = f64::NAN;
-        assert_eq!(error(&mesh), SplineError::NotFinite { point: 5 });
+        for bad in [f64::NAN, f64::INFINITY, -1e200] {
+            let mut mesh = cube();
+            mesh.points[5].y = bad;
+            assert_eq!(error(&mesh), SplineError::NotFinite { point: 5 });
+        }
         let mut mesh = cube();
         mesh.quads[2][1] = 0;
         assert!(matches!(error(&mesh), SplineError::DegenerateQuad { quad: 2, point: 0, .. }));

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::bezier::{bernstein, bernstein_slope};
+use super::bezier::{basis, visit_grid};
 use super::{Patch, gauss};
 use crate::Vec3;
 
@@ -23,28 +23,12 @@ pub fn area(patches: &[Patch]) -> f64 {
 }
 
 fn integrate(patches: &[Patch], integrand: impl Fn(Vec3, Vec3, Vec3) -> f64 + Sync) -> f64 {
-    let basis = gauss::RULE.map(|(t, _)| (bernstein(t), bernstein_slope(t)));
+    let table = gauss::RULE.map(|(t, _)| basis(t));
     let one = |patch: &Patch| {
         let mut sum = 0.0;
-        for ((value_u, slope_u), (_, weight_u)) in basis.iter().zip(gauss::RULE.iter()) {
-            let mut line = [Vec3::zeros(); 6];
-            let mut line_du = [Vec3::zeros(); 6];
-            for (row, (x, dx)) in patch.control.iter().zip(value_u.iter().zip(slope_u)) {
-                for (j, point) in row.iter().enumerate() {
-                    line[j] += point * *x;
-                    line_du[j] += point * *dx;
-                }
-            }
-            for ((value_v, slope_v), (_, weight_v)) in basis.iter().zip(gauss::RULE.iter()) {
-                let (mut x, mut du, mut dv) = (Vec3::zeros(), Vec3::zeros(), Vec3::zeros());
-                for j in 0..6 {
-                    x += line[j] * value_v[j];
-                    du += line_du[j] * value_v[j];
-                    dv += line[j] * slope_v[j];
-                }
-                sum += weight_u * weight_v * integrand(x, du, dv);
-            }
-        }
+        visit_grid(patch, &table, |i, j, x, du, dv| {
+            sum += gauss::RULE[i].1 * gauss::RULE[j].1 * integrand(x, du, dv);
+        });
         sum
     };
     let parts: Vec<f64> = patches.par_iter().map(one).collect();

@@ -19,7 +19,7 @@ pub use brep::{BrepOptions, FaceMode, build_brep};
 pub use error::SplineError;
 pub use measure::{area, volume};
 pub use patches::{PatchOptions, patches};
-pub use quality::{FoldReport, G1Report, g1_max, worst_fold};
+pub use quality::{G1Report, Jacobian, g1_max, jacobians};
 pub use tessellate::{SurfaceSample, TessellateOptions, Tessellation, tessellate};
 pub mod catmull_clark;
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::corner::{CornerData, corner_data, edge_cosine};
 use super::half_edges::{HalfEdges, next, previous};
-use super::quality::worst_fold;
+use super::quality::jacobians;
 use super::{ControlMesh, Patch, STAGE, SplineError};
 use crate::Vec3;
 use crate::monitor::Monitor;
@@ -64,19 +64,25 @@ pub fn patches(mesh: &ControlMesh, options: &PatchOptions, monitor: &Monitor) ->
     let patches: Vec<Patch> =
         (0..mesh.quads.len() as u32).into_par_iter().map(|q| patch(&half_edges, &corners, &strips, q)).collect();
     monitor.step(STAGE, "folds", 0.8)?;
-    if let Some(fold) = worst_fold(&patches, options.fold_limit) {
-        if fold.count > 0 {
-            monitor.warn(
-                STAGE,
-                format!(
-                    "{} patches fold or nearly fold; worst: quad {} at {:.3?} with normalised Jacobian {:.3} (limit {})",
-                    fold.count, fold.quad, fold.place, fold.value, options.fold_limit
-                ),
-            );
-        }
-    }
+    warn_of_folds(&patches, options.fold_limit, monitor);
     monitor.step(STAGE, "patches", 1.0)?;
     Ok(patches)
+}
+
+fn warn_of_folds(patches: &[Patch], limit: f64, monitor: &Monitor) {
+    let all = jacobians(patches);
+    let worst = all.iter().enumerate().min_by(|a, b| a.1.value.total_cmp(&b.1.value));
+    let Some((quad, worst)) = worst.filter(|(_, worst)| worst.value < limit) else { return };
+    let count = all.iter().filter(|jacobian| jacobian.value < limit).count();
+    let (place, value) = (<[f64; 3]>::from(worst.place), worst.value);
+    monitor.warn(
+        STAGE,
+        format!(
+            "{count} of {} patches fold or nearly fold, because the control mesh does; worst: quad {quad} at {place:.2?} \
+             with normalised Jacobian {value:.3} (limit {limit})",
+            patches.len()
+        ),
+    );
 }
 
 /// Inner control points (2 and 3) of the boundary row and of the second row along a half-edge.

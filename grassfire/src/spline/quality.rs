@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::bezier::{Basis, basis, visit_grid};
 use super::half_edges::HalfEdges;
-use super::{ControlMesh, Patch, SplineError, SurfacePoint, evaluate};
+use super::{ControlMesh, Patch, SplineError, evaluate};
 use crate::Vec3;
 
 /// Largest kink and gap between neighbouring patches.
@@ -81,49 +82,46 @@ fn edge_report(patches: &[Patch], h: u32, g: u32) -> G1Report {
     report
 }
 
-/// The place where the patches are closest to folding over.
+/// How close a patch is to folding over.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FoldReport {
+pub struct Jacobian {
     /// Smallest normalised Jacobian: sine of the angle between the derivatives, times the cosine between the normals
-    /// of this and the next sample. Zero where the patch is singular, negative where its normal flips over.
+    /// of this and the sample before. Near one for a good patch, zero where it is singular, negative where its normal
+    /// flips over.
     pub value: f64,
-    /// The quad.
-    pub quad: u32,
-    /// Where, mm.
-    pub place: [f64; 3],
-    /// Patches with a value below the limit.
-    pub count: usize,
+    /// Where it is smallest, mm.
+    pub place: Vec3,
 }
 
-const FOLD_SAMPLES: usize = 9;
+/// Samples a direction, corners included.
+const JACOBIAN_SAMPLES: usize = 9;
 
-/// Finds the smallest normalised Jacobian on a 9 x 9 grid a patch, corners included; `None` without patches.
-pub fn worst_fold(patches: &[Patch], limit: f64) -> Option<FoldReport> {
-    let all: Vec<(f64, Vec3)> = patches.par_iter().map(smallest_jacobian).collect();
-    let count = all.iter().filter(|(value, _)| *value < limit).count();
-    let (quad, (value, place)) = all.iter().enumerate().min_by(|x, y| x.1.0.total_cmp(&y.1.0))?;
-    Some(FoldReport { value: *value, quad: quad as u32, place: (*place).into(), count })
+/// The smallest normalised Jacobian of each patch on a 9 x 9 grid.
+pub fn jacobians(patches: &[Patch]) -> Vec<Jacobian> {
+    let table: [Basis; JACOBIAN_SAMPLES] = std::array::from_fn(|k| basis(k as f64 / (JACOBIAN_SAMPLES - 1) as f64));
+    patches.par_iter().map(|patch| smallest_jacobian(patch, &table)).collect()
 }
 
-fn smallest_jacobian(patch: &Patch) -> (f64, Vec3) {
-    let samples: [[SurfacePoint; FOLD_SAMPLES]; FOLD_SAMPLES] = std::array::from_fn(|i| {
-        std::array::from_fn(|j| {
-            let [u, v] = [i, j].map(|k| k as f64 / (FOLD_SAMPLES - 1) as f64);
-            evaluate(patch, u, v)
-        })
-    });
-    let mut worst = (f64::INFINITY, Vec3::zeros());
-    for i in 0..FOLD_SAMPLES {
-        for j in 0..FOLD_SAMPLES {
-            let point = &samples[i][j];
-            let lengths = point.du.norm() * point.dv.norm();
-            let sine = if lengths > 0.0 { point.du.cross(&point.dv).norm() / lengths } else { 0.0 };
-            let after = [&samples[(i + 1).min(FOLD_SAMPLES - 1)][j], &samples[i][(j + 1).min(FOLD_SAMPLES - 1)]];
-            let value = after.iter().map(|p| sine * p.normal.dot(&point.normal)).fold(sine, f64::min);
-            if value < worst.0 {
-                worst = (value, point.position);
-            }
+fn smallest_jacobian(patch: &Patch, table: &[Basis; JACOBIAN_SAMPLES]) -> Jacobian {
+    let mut worst = Jacobian { value: f64::INFINITY, place: Vec3::zeros() };
+    // Normals of the row before, the sample before comes from this row.
+    let mut before = [Vec3::zeros(); JACOBIAN_SAMPLES];
+    visit_grid(patch, table, |i, j, place, du, dv| {
+        let lengths = du.norm() * dv.norm();
+        let cross = du.cross(&dv);
+        let sine = if lengths > 0.0 { cross.norm() / lengths } else { 0.0 };
+        let normal = cross.try_normalize(f64::MIN_POSITIVE).unwrap_or_default();
+        let mut value = sine;
+        if i > 0 {
+            value = value.min(sine * normal.dot(&before[j]));
         }
-    }
+        if j > 0 {
+            value = value.min(sine * normal.dot(&before[j - 1]));
+        }
+        before[j] = normal;
+        if value < worst.value {
+            worst = Jacobian { value, place };
+        }
+    });
     worst
 }

@@ -80,8 +80,7 @@ pub fn tessellate(
     if patches.len() != mesh.quads.len() {
         return Err(SplineError::PatchCount { patches: patches.len(), quads: mesh.quads.len() });
     }
-    let (needs, limited) = divisions(patches, options);
-    let grid = Grid::new(&half_edges, &needs);
+    let (grid, limited) = Grid::new(&half_edges, needs(patches, options), options.max_triangles);
     let samples = grid.samples();
     let points: Vec<Vec3> = samples
         .par_iter()
@@ -94,23 +93,13 @@ pub fn tessellate(
     Ok(Tessellation { mesh: TriMesh { points, triangles, tags }, samples, limited })
 }
 
-/// Parts along u and v of each patch, and whether they had to be made coarser.
-fn divisions(patches: &[Patch], options: &TessellateOptions) -> (Vec<[u32; 2]>, bool) {
+/// Parts along u and v that each patch needs.
+fn needs(patches: &[Patch], options: &TessellateOptions) -> Vec<[u32; 2]> {
     let most = options.max_divisions.clamp(1, 1024);
-    let mut needs: Vec<[u32; 2]> = match options.divisions {
+    match options.divisions {
         Some(n) => vec![[n.clamp(1, most); 2]; patches.len()],
         None => patches.par_iter().map(|patch| need(patch, options.chord, most)).collect(),
-    };
-    let triangles = |needs: &[[u32; 2]]| needs.iter().map(|[u, v]| 2 * *u as usize * *v as usize).sum::<usize>();
-    let mut limited = false;
-    for _ in 0..10 {
-        if triangles(&needs) <= options.max_triangles {
-            break;
-        }
-        limited = true;
-        needs.iter_mut().flatten().for_each(|n| *n = (*n / 2).max(1));
     }
-    (needs, limited)
 }
 
 fn need(patch: &Patch, chord: f64, most: u32) -> [u32; 2] {
@@ -152,17 +141,18 @@ struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    fn new(half_edges: &'a HalfEdges, needs: &[[u32; 2]]) -> Self {
-        let need = |h: u32| needs[h as usize / 4][(h & 1) as usize];
-        let parts: Vec<u32> =
-            (0..half_edges.len()).map(|h| need(h).max(need(half_edges.twin[h as usize]))).collect();
-        let cells: Vec<[u32; 2]> = parts
-            .chunks_exact(4)
-            .map(|side| {
-                let [u, v] = [side[0].max(side[2]), side[1].max(side[3])];
-                if side[0] == side[2] && side[1] == side[3] { [u, v] } else { [u.max(2), v.max(2)] }
-            })
-            .collect();
+    /// Numbers the points; halves the `needs` until there are few enough triangles, which it tells.
+    fn new(half_edges: &'a HalfEdges, mut needs: Vec<[u32; 2]>, max_triangles: usize) -> (Self, bool) {
+        const INDEX_LIMIT: usize = 1 << 30;
+        let (mut parts, mut cells) = divide(half_edges, &needs);
+        let too_many =
+            |cells: &[[u32; 2]]| cells.iter().map(|[u, v]| 2 * *u as usize * *v as usize).sum::<usize>() > max_triangles.min(INDEX_LIMIT);
+        let mut limited = false;
+        while too_many(&cells) && needs.iter().flatten().any(|n| *n > 1) {
+            limited = true;
+            needs.iter_mut().flatten().for_each(|n| *n = (*n / 2).max(1));
+            (parts, cells) = divide(half_edges, &needs);
+        }
         let mut count = 0;
         let mut take = |n: u32| {
             let first = count;
@@ -176,7 +166,7 @@ impl<'a> Grid<'a> {
             edge[h as usize] = if h < g { take(parts[h as usize] - 1) } else { edge[g as usize] };
         }
         let inner = cells.iter().map(|[u, v]| take((u - 1) * (v - 1))).collect();
-        Self { half_edges, parts, cells, corner, edge, inner, count }
+        (Self { half_edges, parts, cells, corner, edge, inner, count }, limited)
     }
 
     /// Where every point lies.
@@ -248,6 +238,18 @@ impl<'a> Grid<'a> {
         }
         triangles
     }
+}
+
+/// Parts of each half-edge: the larger need of its two quads; and cells of each quad.
+fn divide(half_edges: &HalfEdges, needs: &[[u32; 2]]) -> (Vec<u32>, Vec<[u32; 2]>) {
+    let need = |h: u32| needs[h as usize / 4][(h & 1) as usize];
+    let parts: Vec<u32> = (0..half_edges.len()).map(|h| need(h).max(need(half_edges.twin[h as usize]))).collect();
+    let cells = parts.chunks_exact(4).map(|side| {
+        let [u, v] = [side[0].max(side[2]), side[1].max(side[3])];
+        if side[0] == side[2] && side[1] == side[3] { [u, v] } else { [u.max(2), v.max(2)] }
+    });
+    let cells = cells.collect();
+    (parts, cells)
 }
 
 /// Two triangles for each cell of a grid, cut along the shorter diagonal.
