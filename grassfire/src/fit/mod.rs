@@ -35,6 +35,8 @@ pub struct FitOptions {
     pub max_step: f64,
     /// Largest number of untangling rounds; 0 switches untangling off.
     pub untangle_rounds: u32,
+    /// Rounds that give back what untangling took, without new intersections.
+    pub regrow_rounds: u32,
     /// An untangling round may lower the volume by at most this fraction.
     pub max_volume_loss: f64,
     /// An untangling round may raise the rms distance by at most this fraction.
@@ -44,11 +46,12 @@ pub struct FitOptions {
 impl Default for FitOptions {
     fn default() -> Self {
         Self {
-            rounds: 12,
-            fairness: 0.05,
+            rounds: 14,
+            fairness: 0.02,
             iso_samples: 20_000,
             max_step: 4.0,
             untangle_rounds: 12,
+            regrow_rounds: 10,
             max_volume_loss: 0.01,
             max_rms_growth: 0.5,
         }

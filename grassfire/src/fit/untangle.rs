@@ -10,6 +10,13 @@ use crate::mesh::self_intersection::self_intersections;
 use crate::monitor::Monitor;
 
 /// Step 3 of [`super::fit`].
+///
+/// 1. Unfold: around the offending quads fairness grows and data counts less, until nothing
+///    intersects. This may thin necks.
+/// 2. Regrow: with all data back, rounds whose steps are shortened wherever they would create an
+///    intersection.
+/// 3. Guard: keep the result only if volume and accuracy stayed within the limits; else the fit as
+///    it was, its places reported.
 pub(super) fn untangle(
     solver: &mut Solver,
     points: &mut Vec<Vec3>,
@@ -17,53 +24,117 @@ pub(super) fn untangle(
     options: &FitOptions,
     monitor: &Monitor,
 ) -> Result<(), FitError> {
-    let mut found = Tangles::of(solver, points);
-    fitted.pairs_before_untangling = found.pairs.len() as u32;
+    let before = Tangles::of(solver, points);
+    fitted.pairs_before_untangling = before.pairs.len() as u32;
+    if before.pairs.is_empty() || options.untangle_rounds == 0 {
+        fitted.self_intersections = before.places(solver);
+        return Ok(());
+    }
+    let (rms, volume) = (solver.body_to_iso(points).rms, solver.surface.volume(points));
+    let mut trial = points.clone();
+    let mut left = unfold(solver, &mut trial, before.clone(), fitted, options, monitor)?;
+    left = regrow(solver, &mut trial, left, fitted, options, monitor)?;
+    let after = state(solver, &trial, &left);
+    let passes = after.rms <= rms * (1.0 + options.max_rms_growth)
+        && after.volume >= volume * (1.0 - options.max_volume_loss)
+        && left.pairs.len() < before.pairs.len();
+    if passes {
+        *points = trial;
+        fitted.self_intersections = left.places(solver);
+    } else {
+        fitted.self_intersections = before.places(solver);
+    }
+    Ok(())
+}
+
+fn state(solver: &Solver, points: &[Vec3], tangles: &Tangles) -> UntangleRound {
+    UntangleRound {
+        pairs: tangles.pairs.len() as u32,
+        rms: solver.body_to_iso(points).rms,
+        volume: solver.surface.volume(points),
+        accepted: true,
+    }
+}
+
+fn unfold(
+    solver: &mut Solver,
+    points: &mut Vec<Vec3>,
+    mut found: Tangles,
+    fitted: &mut Fitted,
+    options: &FitOptions,
+    monitor: &Monitor,
+) -> Result<Tangles, FitError> {
+    let mut best = (found.clone(), points.clone());
     for round in 0..options.untangle_rounds {
         if found.pairs.is_empty() {
             break;
         }
-        monitor.step(STAGE, "untangling", 0.65 + 0.3 * f64::from(round) / f64::from(options.untangle_rounds))?;
-        let n = solver.surface.coarse.point_count;
-        let mut m = vec![false; n];
-        for &q in &found.quads {
-            for v in solver.surface.coarse.quads[q as usize] {
-                m[v as usize] = true;
-            }
-        }
-        let inner: Vec<u32> = (0..n as u32).filter(|&v| m[v as usize]).collect();
-        for v in inner {
-            for h in solver.surface.coarse.ring(v) {
-                m[solver.surface.coarse.head(h) as usize] = true;
-                m[solver.surface.coarse.diagonal(h) as usize] = true;
-            }
-        }
-        for v in 0..n {
-            if m[v] {
-                solver.fairness[v] = (solver.fairness[v] * 6.0).min(2000.0);
-            }
+        monitor.step(STAGE, "untangling", 0.65 + 0.15 * f64::from(round) / f64::from(options.untangle_rounds))?;
+        let near = found.control_points(solver, 1);
+        for (factor, _) in solver.fairness.iter_mut().zip(&near).filter(|(_, near)| **near) {
+            *factor = (*factor * 6.0).min(2000.0);
         }
         for j in 0..solver.trust.len() {
-            let (p, w) = solver.surface.samples.row(j);
-            let inf: f64 = p.iter().zip(w).filter(|(p, _)| m[**p as usize]).map(|x| x.1).sum();
-            solver.trust[j] *= 1.0 - 0.6 * inf.clamp(0.0, 1.0);
+            let (indices, weights) = solver.surface.samples.row(j);
+            let inside = indices.iter().zip(weights).filter(|(p, _)| near[**p as usize]);
+            let share: f64 = inside.map(|x| x.1).sum();
+            solver.trust[j] *= 1.0 - 0.6 * share.clamp(0.0, 1.0);
         }
-        let mut trial = points.clone();
         for k in 0..2 {
-            solver.round(&mut trial, options.rounds + 2 * round + k)?;
+            solver.round(points, options.rounds + 2 * round + k)?;
         }
-        let after = Tangles::of(solver, &trial);
-        let rms = solver.body_to_iso(&trial).rms;
-        let volume = solver.surface.volume(&trial);
-        fitted.untangle_rounds.push(UntangleRound { pairs: after.pairs.len() as u32, rms, volume, accepted: true });
-        *points = trial;
-        found = after;
+        found = Tangles::of(solver, points);
+        fitted.untangle_rounds.push(state(solver, points, &found));
+        if found.pairs.len() < best.0.pairs.len() {
+            best = (found.clone(), points.clone());
+        }
     }
-    fitted.self_intersections = found.places(solver);
-    Ok(())
+    *points = best.1;
+    Ok(best.0)
+}
+
+/// Rounds with all data, their steps shortened where they would make things worse.
+fn regrow(
+    solver: &mut Solver,
+    points: &mut Vec<Vec3>,
+    mut found: Tangles,
+    fitted: &mut Fitted,
+    options: &FitOptions,
+    monitor: &Monitor,
+) -> Result<Tangles, FitError> {
+    solver.trust.fill(1.0);
+    solver.fairness.fill(1.0);
+    for round in 0..options.regrow_rounds {
+        monitor.step(STAGE, "regrowing", 0.8 + 0.15 * f64::from(round) / f64::from(options.regrow_rounds))?;
+        let mut wanted = points.clone();
+        solver.round(&mut wanted, options.rounds + round)?;
+        let mut share = vec![1.0; points.len()];
+        let mut accepted = None;
+        for attempt in 0..8 {
+            let trial: Vec<Vec3> =
+                points.iter().zip(&wanted).zip(&share).map(|((p, w), s)| p + *s * (w - p)).collect();
+            let tangles = Tangles::of(solver, &trial);
+            if tangles.pairs.len() <= found.pairs.len() {
+                accepted = Some((trial, tangles));
+                break;
+            }
+            for (ring, factor) in [(0, 0.5), (1 + attempt / 3, 0.7)] {
+                let near = tangles.control_points(solver, ring);
+                for (s, _) in share.iter_mut().zip(&near).filter(|(_, near)| **near) {
+                    *s = if attempt > 5 { 0.0 } else { *s * factor };
+                }
+            }
+        }
+        let Some((trial, tangles)) = accepted else { break };
+        *points = trial;
+        found = tangles;
+        fitted.untangle_rounds.push(state(solver, points, &found));
+    }
+    Ok(found)
 }
 
 /// Where the limit surface intersects itself.
+#[derive(Clone)]
 struct Tangles {
     mesh: TriMesh,
     pairs: Vec<[u32; 2]>,
@@ -80,6 +151,24 @@ impl Tangles {
         quads.sort_unstable();
         quads.dedup();
         Self { mesh, pairs, quads }
+    }
+
+    /// Control points of the offending quads and of `rings` rings of quads around.
+    fn control_points(&self, solver: &Solver, rings: u32) -> Vec<bool> {
+        let coarse = &solver.surface.coarse;
+        let mut near = vec![false; coarse.point_count];
+        for &q in &self.quads {
+            coarse.quads[q as usize].iter().for_each(|&v| near[v as usize] = true);
+        }
+        for _ in 0..rings {
+            let inner = near.clone();
+            for quad in &coarse.quads {
+                if quad.iter().any(|&v| inner[v as usize]) {
+                    quad.iter().for_each(|&v| near[v as usize] = true);
+                }
+            }
+        }
+        near
     }
 
     /// Groups offending quads that share points or intersect each other.

@@ -155,11 +155,17 @@ fn crosses(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
 fn intersect(mesh: &TriMesh, i: usize, j: usize) -> bool {
     let (ti, tj) = (mesh.triangles[i], mesh.triangles[j]);
     let (a, b) = (mesh.corners(i), mesh.corners(j));
-    let shared: Vec<(usize, usize)> = (0..3)
-        .flat_map(|k| (0..3).map(move |m| (k, m)))
-        .filter(|&(k, m)| ti[k] == tj[m])
-        .collect();
-    match shared[..] {
+    let mut shared = [(0, 0); 9];
+    let mut count = 0;
+    for k in 0..3 {
+        for m in 0..3 {
+            if ti[k] == tj[m] {
+                shared[count] = (k, m);
+                count += 1;
+            }
+        }
+    }
+    match shared[..count] {
         [] => {
             let edge = |t: &[Vec3; 3], k: usize, other: &[Vec3; 3]| crosses(&t[k], &t[(k + 1) % 3], other);
             (0..3).any(|k| edge(&a, k, &b) || edge(&b, k, &a)) || coplanar_overlap(&a, &b)
