@@ -17,8 +17,12 @@ pub struct Cli {
 }
 
 const EXIT_CODES: &str = "\
-Exit codes: 0 all well, 1 a check failed (files are written), 2 bad input or usage (nothing is written),
-            3 a stage failed, 130 cancelled.";
+Exit codes:
+  0    all well
+  1    a check failed; the files are written
+  2    bad input or usage; nothing is written
+  3    a stage failed
+  130  cancelled";
 
 /// The commands.
 #[derive(Debug, Subcommand)]
@@ -63,10 +67,10 @@ pub struct ReconstructArgs {
     #[arg(long, value_name = "FILE")]
     pub skeleton: Option<PathBuf>,
     /// Edge of a voxel, mm (remesh.voxel)
-    #[arg(long, value_name = "MM", value_parser = positive)]
+    #[arg(long, value_name = "MM", value_parser = positive, allow_negative_numbers = true)]
     pub voxel: Option<f64>,
     /// Edge of a skeleton quad, mm (skeleton.quad_size)
-    #[arg(long, value_name = "MM", value_parser = positive)]
+    #[arg(long, value_name = "MM", value_parser = positive, allow_negative_numbers = true)]
     pub quad_size: Option<f64>,
     /// Density at which material begins (read.threshold)
     #[arg(long, value_name = "VALUE", value_parser = finite, allow_negative_numbers = true)]

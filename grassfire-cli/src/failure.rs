@@ -67,8 +67,10 @@ pub fn from_clap(error: &clap::Error) -> Failure {
     let text = error.render().to_string();
     let body = text.strip_prefix("error: ").unwrap_or(&text);
     let message = body.split("\n\n").next().unwrap_or(body);
-    let tip = text.lines().find_map(|line| line.trim().strip_prefix("tip: "));
-    let hint = tip.map_or_else(|| "`grassfire --help` and `grassfire COMMAND --help` show the usage".to_owned(), str::to_owned);
+    let line = |start: &str| text.lines().find_map(|line| line.trim().strip_prefix(start).map(str::to_owned));
+    let hint = line("tip: ")
+        .or_else(|| line("Usage: ").map(|usage| format!("usage: {usage}")))
+        .unwrap_or_else(|| "`grassfire --help` shows the usage".to_owned());
     Failure::usage(message, Some(hint))
 }
 
