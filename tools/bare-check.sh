@@ -18,6 +18,8 @@ fail() { echo "bare-check: $*" >&2; exit 2; }
 [ "$(id -u)" -eq 0 ] || fail "needs root (chroot)"
 command -v debootstrap >/dev/null 2>&1 || fail "needs debootstrap: apt-get install debootstrap"
 
+mkdir -p "$folder"
+folder=$(realpath "$folder")
 root=$folder/root
 if [ ! -x "$root/usr/bin/make" ]; then
   echo "bare-check: Debian $suite into $root"
