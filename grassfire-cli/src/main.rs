@@ -1,2 +1,73 @@
 //! `grassfire`: the command line.
-fn main() {}
+
+mod about;
+mod args;
+mod failure;
+mod progress;
+mod run;
+mod settings;
+mod summary;
+
+use std::process::ExitCode;
+
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
+use grassfire::pipeline::ReconstructOptions;
+
+use args::{Cli, Command};
+use failure::Failure;
+
+fn main() -> ExitCode {
+    let result = match Cli::try_parse() {
+        Ok(cli) => dispatch(&cli.command),
+        Err(error) => usage(&error),
+    };
+    match result {
+        Ok(code) => ExitCode::from(code),
+        Err(failure) => {
+            failure.print();
+            ExitCode::from(failure.code)
+        }
+    }
+}
+
+fn dispatch(command: &Command) -> Result<u8, Failure> {
+    match command {
+        Command::Reconstruct(args) => return run::reconstruct_command(args),
+        Command::Demo(args) => return run::demo_command(args),
+        Command::Schema => run::print(&schema()?),
+        Command::About(args) => run::print(&about::text(args.cite)),
+        Command::Completions { shell } => {
+            clap_complete::generate(*shell, &mut Cli::command(), "grassfire", &mut std::io::stdout().lock());
+        }
+        Command::Man => {
+            let mut page = Vec::new();
+            let written = clap_mangen::Man::new(Cli::command()).render(&mut page);
+            written.map_err(|e| Failure::usage(format!("cannot make the manual page: {e}"), None))?;
+            run::print(&String::from_utf8_lossy(&page));
+        }
+    }
+    Ok(0)
+}
+
+fn schema() -> Result<String, Failure> {
+    let schema = schemars::schema_for!(ReconstructOptions);
+    let text = serde_json::to_string_pretty(&schema);
+    text.map(|text| text + "\n").map_err(|e| Failure::usage(format!("cannot write the schema: {e}"), None))
+}
+
+/// Help and version are answers; everything else that clap refuses is an error in our two lines.
+fn usage(error: &clap::Error) -> Result<u8, Failure> {
+    match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
+            let _ = error.print();
+            Ok(0)
+        }
+        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            let _ = error.print();
+            eprintln!();
+            Err(Failure::usage("no command was given", Some("grassfire reconstruct part.stl -o out".to_owned())))
+        }
+        _ => Err(failure::from_clap(error)),
+    }
+}

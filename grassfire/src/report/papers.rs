@@ -35,7 +35,7 @@ pub const ALL: &[Paper] = &[
         key: "barill2018",
         citation: "G. Barill, N. G. Dickson, R. Schmidt, D. I. W. Levin, A. Jacobson (2018): Fast winding numbers for soups and clouds. ACM Transactions on Graphics 37(4).",
         doi: "10.1145/3197517.3201337",
-        stages: &["repair", "remesh"],
+        stages: &["input", "remesh"],
         used_for: "inside and outside of dirty meshes",
     },
     Paper {

@@ -1,0 +1,45 @@
+# make demo | test are all that a newcomer needs; each installs what is missing first.
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.ONESHELL:
+.DEFAULT_GOAL := help
+
+CARGO ?= cargo
+TARGET := $(or $(CARGO_TARGET_DIR),target)
+GRASSFIRE := $(TARGET)/release/grassfire
+DEMO_OUT ?= out/wishbone
+CORPUS ?= $(or $(GRASSFIRE_CORPUS),../shared/data)
+
+.PHONY: help setup build demo test bench corpus outside-check
+
+help: ## this list
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
+
+setup: ## install what is missing (Rust, compiler, OpenCASCADE), nothing else
+	@tools/setup.sh
+
+build: setup ## target/release/grassfire
+	@. tools/env.sh
+	$(CARGO) build --release --locked -p grassfire-cli
+
+demo: build ## reconstruct the wishbone: STEP and report in out/wishbone
+	@code=0
+	$(GRASSFIRE) demo wishbone -o $(DEMO_OUT) || code=$$?
+	if [ $$code -le 1 ]; then
+	  echo
+	  echo "STEP    $(DEMO_OUT)/part.step"
+	  echo "report  $(DEMO_OUT)/report.html"
+	fi
+	exit $$code
+
+test: setup ## format, lints, all tests, checks of the demo's STEP by other programs
+	@tools/test.sh
+
+bench: setup ## speed against peers and bounds
+	@. tools/env.sh
+	$(CARGO) bench --locked -p grassfire
+
+corpus: build ## the real and the bad parts of $(CORPUS)
+	@. tools/env.sh
+	if [ ! -d "$(CORPUS)" ]; then echo "no corpus in $(CORPUS): set GRASSFIRE_CORPUS to its folder" >&2; exit 2; fi
+	GRASSFIRE_CORPUS="$$(realpath "$(CORPUS)")" $(CARGO) test --release --locked -p grassfire -p grassfire-cli -- --include-ignored

@@ -1,0 +1,146 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
+
+/// From topology-optimization meshes to editable, checked CAD solids.
+///
+/// Lengths are millimetres. Data goes to stdout, progress and messages to stderr.
+#[derive(Debug, Parser)]
+#[command(name = "grassfire", version, after_help = EXIT_CODES, max_term_width = 100)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    all well
+  1    a check failed; the files are written
+  2    bad input or usage; nothing is written
+  3    a stage failed
+  130  cancelled";
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Turns a mesh or a density into a STEP solid and a report
+    #[command(after_help = RECONSTRUCT_EXAMPLES)]
+    Reconstruct(Box<ReconstructArgs>),
+    /// Runs everything on a built-in example
+    Demo(DemoArgs),
+    /// Prints the JSON Schema of all options (the keys of --set)
+    Schema,
+    /// Prints the version, and with --cite the papers behind it
+    About(AboutArgs),
+    /// Prints a completion script for a shell
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
+    /// Prints the manual page
+    Man,
+}
+
+const RECONSTRUCT_EXAMPLES: &str = "\
+Examples:
+  grassfire reconstruct part.stl -o out
+  grassfire reconstruct part.stl --non-design bores.step --voxel 0.8 -o out
+  grassfire reconstruct density.vti --iso 0.4 --set remesh.min_tunnel=0 -o out --json";
+
+/// Arguments of `reconstruct`.
+#[derive(Debug, Args)]
+pub struct ReconstructArgs {
+    /// Mesh (STL, OBJ, PLY, OFF, 3MF) or density (VTI, VTU, NPY)
+    #[arg(value_name = "PART")]
+    pub part: PathBuf,
+    /// Design space, to check that the solid stays inside (STEP or STL)
+    #[arg(long, value_name = "FILE")]
+    pub design_space: Option<PathBuf>,
+    /// Body that must be in the solid as given (STEP or STL); may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub non_design: Vec<PathBuf>,
+    /// Quad skeleton to use instead of our own (PLY or OBJ)
+    #[arg(long, value_name = "FILE")]
+    pub skeleton: Option<PathBuf>,
+    /// Edge of a voxel, mm (remesh.voxel)
+    #[arg(long, value_name = "MM", value_parser = positive, allow_negative_numbers = true)]
+    pub voxel: Option<f64>,
+    /// Edge of a skeleton quad, mm (skeleton.quad_size)
+    #[arg(long, value_name = "MM", value_parser = positive, allow_negative_numbers = true)]
+    pub quad_size: Option<f64>,
+    /// Density at which material begins (read.threshold)
+    #[arg(long, value_name = "VALUE", value_parser = finite, allow_negative_numbers = true)]
+    pub iso: Option<f64>,
+    /// Refuse a mesh that needs repair (repair.strict)
+    #[arg(long)]
+    pub strict: bool,
+    /// Folder for the results; made when missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// What all runs share.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// Arguments of `demo`.
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Which example
+    #[arg(value_enum)]
+    pub example: Example,
+    /// Folder for the results [default: out/EXAMPLE]
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// What all runs share.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// The built-in examples.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Example {
+    /// A suspension wishbone with two bushing eyes and a ball-joint boss
+    Wishbone,
+}
+
+/// Arguments of `about`.
+#[derive(Debug, Args)]
+pub struct AboutArgs {
+    /// List the papers whose methods are used
+    #[arg(long)]
+    pub cite: bool,
+}
+
+/// What all runs share.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// Sets any option, such as remesh.min_tunnel=0; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Threads; 0 takes all cores
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Print report.json on stdout
+    #[arg(long)]
+    pub json: bool,
+    /// No progress, warnings or summary
+    #[arg(short, long, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say when each stage ends and how long it took
+    #[arg(short, long)]
+    pub verbose: bool,
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if value.is_finite() { Ok(value) } else { Err("must be finite".to_owned()) }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value = finite(text)?;
+    if value > 0.0 { Ok(value) } else { Err("must be above 0".to_owned()) }
+}

@@ -1,0 +1,44 @@
+#!/bin/bash
+# Everything that must hold before a change is merged. Ends with the summary of the test runner.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. tools/env.sh
+
+target=${CARGO_TARGET_DIR:-target}
+step() { echo; echo "== $* ($(date +%H:%M:%S))"; }
+
+missing=()
+cargo fmt --version >/dev/null 2>&1 || missing+=(rustfmt)
+cargo clippy --version >/dev/null 2>&1 || missing+=(clippy)
+if [ ${#missing[@]} -gt 0 ]; then rustup component add "${missing[@]}"; fi
+
+step format
+cargo fmt --all --check
+
+# One profile and one target folder for all steps, so that dependencies are compiled once.
+step lints
+cargo clippy --release --locked --workspace --all-targets -- -D warnings
+step lints without the CAD kernel
+cargo clippy --release --locked -p grassfire -p grassfire-cli --all-targets --no-default-features -- -D warnings
+
+step documentation
+RUSTDOCFLAGS="-D warnings" cargo doc --release --locked --no-deps -p grassfire -p grassfire-cli --quiet
+
+step build without the CAD kernel
+cargo build --release --locked -p grassfire-cli --no-default-features
+
+step demo
+cargo build --release --locked -p grassfire-cli
+demo=$(mktemp -d)
+trap 'rm -rf "$demo"' EXIT
+"$target/release/grassfire" demo wishbone -o "$demo/wishbone" -q || [ $? -eq 1 ]
+
+step outside checks
+tools/outside-check.sh "$demo/wishbone"
+
+step tests
+if cargo nextest --version >/dev/null 2>&1; then
+  cargo nextest run --release --locked --workspace --no-fail-fast
+else
+  cargo test --release --locked --workspace --no-fail-fast
+fi
