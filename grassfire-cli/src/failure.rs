@@ -76,15 +76,17 @@ pub fn from_clap(error: &clap::Error) -> Failure {
 
 #[cfg(test)]
 mod tests {
+    use grassfire::pipeline::StageError;
+
     use super::*;
 
     #[test]
     fn chain_names_every_cause_once() {
-        let io = std::io::Error::other("disk full");
-        let error = PipelineError::Solver { stage: "cad", source: Box::new(io), hint: Some("free some".to_owned()) };
-        let failure = Failure::from(error);
-        assert_eq!(failure.message, "cad: disk full");
-        assert_eq!((failure.code, failure.hint.as_deref()), (3, Some("free some")));
+        let source = StageError::StepProposal { path: "part.step".into() };
+        let failure = Failure::from(PipelineError { stage: "read", source });
+        assert_eq!(failure.message, "read: part.step is a STEP file; the proposal must be a mesh or a density");
+        assert_eq!(failure.code, 2);
+        assert!(failure.hint.is_some());
         assert_eq!(one_line("a\n  b"), "a b");
     }
 }

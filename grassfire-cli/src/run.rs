@@ -24,7 +24,6 @@ pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
     let job = ReconstructJob {
         part: args.part.clone(),
         non_design: args.non_design.clone(),
-        design_space: args.design_space.clone(),
         skeleton: args.skeleton.clone(),
         output: args.output.clone(),
         command: command_line(),
@@ -44,7 +43,7 @@ pub fn demo_command(args: &DemoArgs) -> Result<u8, Failure> {
     // STEP files need the CAD kernel.
     let non_design = if cfg!(feature = "occt") { vec![bodies] } else { Vec::new() };
     let command = command_line();
-    let job = ReconstructJob { part, non_design, design_space: None, skeleton: None, output, command, options };
+    let job = ReconstructJob { part, non_design, skeleton: None, output, command, options };
     run(&job, &args.run)
 }
 

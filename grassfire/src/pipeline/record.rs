@@ -44,7 +44,8 @@ impl Record {
     /// Adds warnings, papers and verdicts; gives the checks that were not met, one line each.
     pub(super) fn finish(&mut self, limits: &Limits, monitor: &Monitor) -> Vec<String> {
         self.report.warnings = monitor.warnings();
-        self.report.papers = papers::for_reconstruct();
+        let stages: Vec<&str> = self.report.stages.iter().map(|stage| stage.name.as_str()).collect();
+        self.report.papers = papers::of_stages(stages).iter().map(|paper| paper.key.to_owned()).collect();
         self.report.checks = judge(&self.report, limits);
         self.report.checks.iter().filter(|check| !check.met).map(line).collect()
     }
