@@ -1,5 +1,6 @@
 //! Voxel remesh: soup in, closed solid and signed distance field out, topological noise removed.
 
+mod closing;
 mod compose;
 mod crossings;
 mod deviation;
@@ -7,6 +8,7 @@ mod digital;
 mod error;
 mod extract;
 mod intersect;
+mod islands;
 mod noise;
 mod options;
 mod patch;
@@ -200,7 +202,7 @@ fn remesh_on(mesh: &TriMesh, source: Option<f64>, options: &RemeshOptions, monit
         return Err(RemeshError::Vanished { voxel, width });
     }
     if !noise.changes.is_empty() {
-        refresh(&mut field, &set, &noise.touched, monitor)?;
+        noise::refresh(&mut field, &set, &noise.touched, monitor)?;
     }
     let forced = compose::separate_opposite_empties(&mut field, &mut set);
     if forced > 0 {
@@ -217,7 +219,10 @@ fn remesh_on(mesh: &TriMesh, source: Option<f64>, options: &RemeshOptions, monit
         return Err(RemeshError::Topology { surface: solid.euler(), voxels: after.chi });
     }
     monitor.step(STAGE, "distance", 0.95)?;
-    let distance_max = deviation::deviation(&fine, &bvh, &solid, &field, &noise.touched, options.samples);
+    let (islands, lost) = islands::lost_islands(mesh, &field, width.max(2.0 * voxel));
+    noise.changes.extend(islands);
+    let skip = |v: usize, t: u32| noise.touched[v] || lost[t as usize];
+    let distance_max = deviation::deviation(mesh, &bvh, &solid, &field, skip, options.samples);
     noise.changes.sort_by(|a, b| b.size.total_cmp(&a.size));
     Ok(Remeshed { solid, field, genus_before: noise.before.b1, genus_after: after.b1, changes: noise.changes, distance_max })
 }
@@ -259,18 +264,6 @@ fn not_solid(bvh: &Bvh, field: &VoxelGrid<f32>) -> RemeshError {
     let lowest = all.iter().copied().fold(f64::INFINITY, f64::min);
     let highest = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     RemeshError::NotSolid { lowest, highest, sampled: places.len() }
-}
-
-/// Distances around changes: values next to the surface and the untouched band are kept, the rest is swept anew.
-fn refresh(field: &mut VoxelGrid<f32>, set: &VoxelSet, touched: &[bool], monitor: &Monitor) -> Result<(), RemeshError> {
-    let band = ((signed_distance::BAND - 0.5) * field.spacing) as f32;
-    let steps = set.neighbours_26();
-    let at_surface = |v: usize| {
-        !set.on_border(v as u32) && steps.iter().any(|s| set.solid[(v as isize + s) as usize] != set.solid[v])
-    };
-    let known: Vec<bool> =
-        (0..touched.len()).map(|v| if touched[v] { at_surface(v) } else { field.values[v].abs() <= band }).collect();
-    signed_distance::sweep(field, &known, monitor)
 }
 
 #[cfg(test)]

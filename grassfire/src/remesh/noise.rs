@@ -5,7 +5,7 @@ use std::collections::{HashSet, VecDeque};
 use super::digital::{VoxelSet, delta_chi, is_simple};
 use super::options::Capsule;
 use super::patch::{Patch, Side, insert};
-use super::{ChangeKind, RemeshError, STAGE, TopologyChange};
+use super::{ChangeKind, RemeshError, STAGE, TopologyChange, signed_distance};
 use crate::Vec3;
 use crate::monitor::Monitor;
 use crate::topology::Betti;
@@ -56,6 +56,10 @@ pub(super) fn remove_noise(
         monitor.step(STAGE, "topological noise", 0.6 + 0.05 * round as f64)?;
         let count = out.changes.len();
         drop_small(grid, &mut set, width, &kept, &mut out);
+        if out.changes.len() > count {
+            // Else the ghosts of the islands would be taken for gaps.
+            refresh(grid, &set, &out.touched, monitor)?;
+        }
         close_tunnels(grid, &mut set, width, &kept, &mut out, monitor)?;
         cut_bridges(grid, &mut set, width, &kept, &mut out, monitor)?;
         if out.changes.len() == count {
@@ -63,6 +67,18 @@ pub(super) fn remove_noise(
         }
     }
     Ok(out)
+}
+
+/// Distances around changes: values next to the surface and the untouched band are kept, the rest is swept anew.
+pub(super) fn refresh(field: &mut VoxelGrid<f32>, set: &VoxelSet, touched: &[bool], monitor: &Monitor) -> Result<(), RemeshError> {
+    let band = ((signed_distance::BAND - 0.5) * field.spacing) as f32;
+    let steps = set.neighbours_26();
+    let at_surface = |v: usize| {
+        !set.on_border(v as u32) && steps.iter().any(|s| set.solid[(v as isize + s) as usize] != set.solid[v])
+    };
+    let known: Vec<bool> =
+        (0..touched.len()).map(|v| if touched[v] { at_surface(v) } else { field.values[v].abs() <= band }).collect();
+    signed_distance::sweep(field, &known, monitor)
 }
 
 /// One flag a voxel: inside a capsule; empty when there are none.
@@ -143,7 +159,12 @@ fn close_tunnels(
     monitor: &Monitor,
 ) -> Result<(), RemeshError> {
     let mut plugs = Vec::new();
+    let six = set.neighbours_6();
     for voxels in residue(grid, set, Side::Solid, width / 2.0, kept, monitor)? {
+        // A piece on its own raises the Euler number too, but closes nothing.
+        if !voxels.iter().any(|&v| six.iter().any(|s| set.solid[(v as isize + s) as usize])) {
+            continue;
+        }
         let gain = flip_all(set, &voxels, true);
         if gain >= 1 {
             plugs.push(Patch::new(grid, voxels));

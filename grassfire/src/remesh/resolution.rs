@@ -12,19 +12,19 @@ use crate::mesh::distance::sample_surface;
 const MARGIN: usize = 4;
 /// Rays for the wall thickness.
 const RAYS: usize = 4000;
-/// Share of the walls that may be thinner than the thickness the voxel is chosen from.
-const THIN_SHARE: f64 = 0.1;
-/// Voxels across such a wall: wanted, and needed even when the grid becomes larger than wanted.
+/// Shares of the walls that may be thinner than the two thicknesses the voxel is chosen from.
+const THIN_SHARES: [f64; 2] = [0.1, 0.25];
+/// Voxels across such walls: wanted, and needed even when the grid becomes larger than wanted.
 const ACROSS: [f64; 2] = [6.0, 2.25];
 /// Voxels along the longest side of the box: at least, wanted at most, at most for the sake of thin walls.
 const LONGEST: [f64; 3] = [60.0, 200.0, 400.0];
 
 /// The voxel edge (mm) that is used when none is asked for.
 ///
-/// 1. `thickness`: 10th percentile of the wall thickness, from inward rays at 4000 points spread over the surface to
+/// 1. Thickness: 10th and 25th percentile of the wall thickness, from inward rays at 4000 points spread over the surface to
 ///    the opposite wall, where that is within 60 degrees of parallel.
-/// 2. `min(mean edge, thickness / 6)`, but no finer than 1/200 of the longest side of the box unless thinner walls
-///    would get fewer than 2.25 voxels, and then no finer than 1/400.
+/// 2. The smaller of the mean edge and 1/6 of the 10th percentile, but no finer than 1/200 of the longest side of the
+///    box unless walls of the 25th percentile would get fewer than 2.25 voxels, and then no finer than 1/400.
 /// 3. No coarser than 1/60 of the longest side; coarser again when `max_voxels` demands it.
 pub fn default_voxel(mesh: &TriMesh, options: &RemeshOptions) -> f64 {
     voxel_for(mesh, &Bvh::new(mesh), options)
@@ -33,9 +33,9 @@ pub fn default_voxel(mesh: &TriMesh, options: &RemeshOptions) -> f64 {
 pub(super) fn voxel_for(mesh: &TriMesh, bvh: &Bvh, options: &RemeshOptions) -> f64 {
     let (lo, hi) = bvh.bounds().unwrap_or_default();
     let longest = (hi - lo).max();
-    let thickness = wall_thickness(mesh, bvh).unwrap_or(f64::INFINITY);
-    let wanted = mean_edge(mesh).min(thickness / ACROSS[0]).max(longest / LONGEST[1]);
-    let needed = wanted.min(thickness / ACROSS[1]).max(longest / LONGEST[2]);
+    let [thin, common] = wall_thickness(mesh, bvh).unwrap_or([f64::INFINITY; 2]);
+    let wanted = mean_edge(mesh).min(thin / ACROSS[0]).max(longest / LONGEST[1]);
+    let needed = wanted.min(common / ACROSS[1]).max(longest / LONGEST[2]);
     let mut voxel = needed.min(longest / LONGEST[0]);
     for _ in 0..64 {
         if voxel_count(&lo, &hi, voxel) <= options.max_voxels as f64 {
@@ -46,8 +46,8 @@ pub(super) fn voxel_for(mesh: &TriMesh, bvh: &Bvh, options: &RemeshOptions) -> f
     voxel
 }
 
-/// Low percentile of the wall thickness, mm; `None` when no ray meets an opposite wall.
-pub(super) fn wall_thickness(mesh: &TriMesh, bvh: &Bvh) -> Option<f64> {
+/// 10th and 25th percentile of the wall thickness, mm; `None` when no ray meets an opposite wall.
+fn wall_thickness(mesh: &TriMesh, bvh: &Bvh) -> Option<[f64; 2]> {
     let (lo, hi) = bvh.bounds()?;
     let diagonal = (hi - lo).norm();
     let normal = |t: u32| {
@@ -67,7 +67,7 @@ pub(super) fn wall_thickness(mesh: &TriMesh, bvh: &Bvh) -> Option<f64> {
         return None;
     }
     walls.sort_by(f64::total_cmp);
-    Some(walls[(walls.len() as f64 * THIN_SHARE) as usize])
+    Some(THIN_SHARES.map(|share| walls[(walls.len() as f64 * share) as usize]))
 }
 
 fn mean_edge(mesh: &TriMesh) -> f64 {

@@ -1,11 +1,10 @@
 //! Signed distance of a triangle soup on a voxel grid.
 
-use std::collections::HashMap;
-
 use rayon::prelude::*;
 
-use super::crossings::sign_by_rows;
-use super::{RemeshError, STAGE};
+use super::closing::caps;
+use super::crossings::winding_by_rows;
+use super::{PIECE, RemeshError, STAGE, split_long_edges};
 use crate::Vec3;
 use crate::mesh::TriMesh;
 use crate::mesh::bvh::Bvh;
@@ -17,15 +16,18 @@ use crate::voxel::VoxelGrid;
 pub(super) const BAND: f64 = 3.0;
 /// Winding number of the surface. A hair above one half, so that an open sheet (exactly 1/2 in its plane) is no solid.
 const INSIDE: f64 = 0.5 + 1e-4;
+/// Rows are counted when at most one open edge comes on this many triangles.
+const OPEN_SHARE: usize = 4;
 /// Edge of the blocks that get one sign where no surface is near, voxels.
 const BLOCK: usize = 4;
 
 /// Signed distance (mm, positive inside) of `mesh`; `bvh` holds the same surface.
 ///
 /// 1. Voxels within 3 voxels of a triangle get their exact distance from the tree.
-/// 2. Sign: winding number > 1/2. When the triangles close up exactly (every edge used as often forward as backward)
-///    it is counted along grid rows. Otherwise the generalized winding number is evaluated in the whole band, and
-///    beyond it for blocks of 4^3 voxels, subdivided where the sign is not clear.
+/// 2. Sign: winding number > 1/2. When few edges are open, caps close them; the winding number of the closed surface
+///    is an integer counted along grid rows, and the generalized winding number of the caps is taken off it. Otherwise
+///    the generalized winding number of everything is evaluated in the whole band, and beyond it for blocks of 4^3
+///    voxels, subdivided where the sign is not clear.
 /// 3. Beyond the band the distance is propagated by fast sweeping.
 pub(super) fn signed_distance(
     mesh: &TriMesh,
@@ -40,10 +42,9 @@ pub(super) fn signed_distance(
     mark_band(bvh, &mut grid);
     exact_distances(bvh, &mut grid);
     monitor.step(STAGE, "inside or outside", 0.3)?;
-    if closes_up(mesh) {
-        sign_by_rows(mesh, &mut grid);
-    } else {
-        sign_by_blocks(&Winding::new(bvh), &mut grid);
+    match caps(mesh, mesh.triangles.len() / OPEN_SHARE) {
+        Some(caps) => sign_by_rows(mesh, caps, &mut grid),
+        None => sign_by_blocks(&Winding::new(bvh), &mut grid),
     }
     monitor.step(STAGE, "far field", 0.5)?;
     let known: Vec<bool> = grid.values.par_iter().map(|v| v.is_finite()).collect();
@@ -110,29 +111,24 @@ fn exact_distances(bvh: &Bvh, grid: &mut VoxelGrid<f32>) {
     });
 }
 
-/// Whether every directed edge has its opposite, so that the winding number is an integer off the surface.
-fn closes_up(mesh: &TriMesh) -> bool {
-    let mut ids: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.points.len());
-    let welded: Vec<u32> = mesh
-        .points
-        .iter()
-        .map(|p| {
-            // Adding zero makes -0.0 and 0.0 one point.
-            let next = ids.len() as u32;
-            *ids.entry([p.x, p.y, p.z].map(|x| (x + 0.0).to_bits())).or_insert(next)
-        })
-        .collect();
-    let mut edges: Vec<(u32, u32, i8)> = Vec::with_capacity(mesh.triangles.len() * 3);
-    for t in &mesh.triangles {
-        for k in 0..3 {
-            let (a, b) = (welded[t[k] as usize], welded[t[(k + 1) % 3] as usize]);
-            if a != b {
-                edges.push((a.min(b), a.max(b), if a < b { 1 } else { -1 }));
+/// Signs for a soup with few open edges, which `caps` close.
+fn sign_by_rows(mesh: &TriMesh, caps: TriMesh, grid: &mut VoxelGrid<f32>) {
+    let fine = split_long_edges(&caps, PIECE * grid.spacing);
+    let bvh = Bvh::new(&fine);
+    let winding = Winding::new(&bvh);
+    let mut closed = caps;
+    closed.triangles.extend(&mesh.triangles);
+    let numbers = winding_by_rows(&closed, grid);
+    let [nx, ny, _] = grid.dims;
+    let (origin, h) = (grid.origin, grid.spacing);
+    grid.values.par_chunks_mut(nx).zip(numbers.par_chunks(nx)).enumerate().for_each(|(row, (values, numbers))| {
+        for (i, (value, &number)) in values.iter_mut().zip(numbers).enumerate() {
+            let p = origin + h * Vec3::new(i as f64, (row % ny) as f64, (row / ny) as f64);
+            if f64::from(number) - winding.at(&p) <= INSIDE {
+                *value = -*value;
             }
         }
-    }
-    edges.par_sort_unstable();
-    edges.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)).all(|group| group.iter().map(|e| i64::from(e.2)).sum::<i64>() == 0)
+    });
 }
 
 /// Gives every voxel whose (unsigned) value satisfies `wanted` the sign of its winding number.
@@ -284,26 +280,24 @@ mod tests {
     }
 
     #[test]
-    fn a_cube_closes_up_and_an_open_one_does_not() {
-        let mut cube = crate::remesh::tests::cube(2.0);
-        assert!(closes_up(&cube));
-        cube.triangles.pop();
-        assert!(!closes_up(&cube));
-    }
-
-    #[test]
-    fn both_sign_rules_agree_on_a_cube() {
+    fn all_sign_rules_agree_on_a_cube() {
         let cube = crate::remesh::tests::cube(8.0);
         let mut open = cube.clone();
-        open.triangles.push([0, 1, 2]);
         open.triangles.push([0, 2, 3]);
-        for mesh in [cube, open] {
+        let mut loose = TriMesh::default();
+        for t in 0..cube.triangles.len() {
+            // Every corner a hair off its neighbours': all edges are open.
+            let n = loose.points.len() as u32;
+            loose.points.extend(cube.corners(t).map(|p| p * (1.0 + 1e-9 * t as f64)));
+            loose.triangles.push([n, n + 1, n + 2]);
+        }
+        for mesh in [cube, open, loose] {
             let bvh = Bvh::new(&mesh);
             let grid = signed_distance(&mesh, &bvh, Vec3::repeat(-5.7), 0.6, [20; 3], &Monitor::default()).expect("no cancel");
             for v in 0..grid.values.len() {
                 let [i, j, k] = grid.ijk(v);
                 let depth = 4.0 - grid.centre(i, j, k).abs().max();
-                assert!(depth.abs() < 1e-9 || (depth > 0.0) == (grid.values[v] > 0.0));
+                assert!(depth.abs() < 1e-6 || (depth > 0.0) == (grid.values[v] > 0.0));
             }
         }
     }
