@@ -20,9 +20,14 @@ pub(super) fn caps(mesh: &TriMesh, limit: usize) -> Option<TriMesh> {
     // Caps run against the open edges.
     let mut from: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for (a, b, times) in open {
-        from.entry(b).or_default().extend(std::iter::repeat_n(a, times));
+        from.entry(b)
+            .or_default()
+            .extend(std::iter::repeat_n(a, times));
     }
-    let mut out = TriMesh { points: mesh.points.clone(), ..TriMesh::default() };
+    let mut out = TriMesh {
+        points: mesh.points.clone(),
+        ..TriMesh::default()
+    };
     while let Some((&start, _)) = from.first_key_value() {
         let mut walk = vec![start];
         let mut at = start;
@@ -40,7 +45,8 @@ pub(super) fn caps(mesh: &TriMesh, limit: usize) -> Option<TriMesh> {
         let mean = walk.iter().map(|&v| mesh.points[v as usize]).sum::<Vec3>() / walk.len() as f64;
         let apex = out.points.len() as u32;
         out.points.push(mean);
-        out.triangles.extend((0..walk.len()).map(|i| [apex, walk[i], walk[(i + 1) % walk.len()]]));
+        out.triangles
+            .extend((0..walk.len()).map(|i| [apex, walk[i], walk[(i + 1) % walk.len()]]));
     }
     Some(out)
 }
@@ -53,7 +59,10 @@ fn open_edges(mesh: &TriMesh) -> Vec<(u32, u32, usize)> {
         .iter()
         .zip(0u32..)
         // Adding zero makes -0.0 and 0.0 one place.
-        .map(|(p, v)| *ids.entry([p.x, p.y, p.z].map(|x| (x + 0.0).to_bits())).or_insert(v))
+        .map(|(p, v)| {
+            *ids.entry([p.x, p.y, p.z].map(|x| (x + 0.0).to_bits()))
+                .or_insert(v)
+        })
         .collect();
     let mut edges: Vec<(u32, u32, i8)> = Vec::with_capacity(mesh.triangles.len() * 3);
     for t in &mesh.triangles {
@@ -71,7 +80,11 @@ fn open_edges(mesh: &TriMesh) -> Vec<(u32, u32, usize)> {
             let (a, b, _) = group[0];
             let sum: i64 = group.iter().map(|e| i64::from(e.2)).sum();
             let times = sum.unsigned_abs() as usize;
-            (sum != 0).then_some(if sum > 0 { (a, b, times) } else { (b, a, times) })
+            (sum != 0).then_some(if sum > 0 {
+                (a, b, times)
+            } else {
+                (b, a, times)
+            })
         })
         .collect()
 }

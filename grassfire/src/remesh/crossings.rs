@@ -30,25 +30,38 @@ pub(super) fn winding_by_rows(mesh: &TriMesh, grid: &VoxelGrid<f32>) -> Vec<i8> 
         .with_min_len(256)
         .flat_map_iter(|t| cut(&mesh.corners(t).map(|p| grid.to_grid(&p)), grid.dims))
         .collect();
-    crossings.par_sort_unstable_by(|a, b| a.row.cmp(&b.row).then(b.x.total_cmp(&a.x)).then(a.sign.cmp(&b.sign)));
-    let mut out = vec![0i8; grid.values.len()];
-    out.par_chunks_mut(grid.dims[0]).enumerate().for_each(|(row, numbers)| {
-        let first = crossings.partition_point(|c| (c.row as usize) < row);
-        let mut beyond = crossings[first..].iter().take_while(|c| c.row as usize == row).peekable();
-        let mut winding = 0i64;
-        for (i, number) in numbers.iter_mut().enumerate().rev() {
-            while let Some(crossing) = beyond.next_if(|c| c.x > i as f64) {
-                winding += i64::from(crossing.sign);
-            }
-            *number = winding.clamp(-128, 127) as i8;
-        }
+    crossings.par_sort_unstable_by(|a, b| {
+        a.row
+            .cmp(&b.row)
+            .then(b.x.total_cmp(&a.x))
+            .then(a.sign.cmp(&b.sign))
     });
+    let mut out = vec![0i8; grid.values.len()];
+    out.par_chunks_mut(grid.dims[0])
+        .enumerate()
+        .for_each(|(row, numbers)| {
+            let first = crossings.partition_point(|c| (c.row as usize) < row);
+            let mut beyond = crossings[first..]
+                .iter()
+                .take_while(|c| c.row as usize == row)
+                .peekable();
+            let mut winding = 0i64;
+            for (i, number) in numbers.iter_mut().enumerate().rev() {
+                while let Some(crossing) = beyond.next_if(|c| c.x > i as f64) {
+                    winding += i64::from(crossing.sign);
+                }
+                *number = winding.clamp(-128, 127) as i8;
+            }
+        });
     out
 }
 
 /// The rows that meet a triangle (corners in voxels).
 fn cut(corners: &[Vec3; 3], dims: [usize; 3]) -> Vec<Crossing> {
-    let (lo, hi) = (corners[0].inf(&corners[1]).inf(&corners[2]), corners[0].sup(&corners[1]).sup(&corners[2]));
+    let (lo, hi) = (
+        corners[0].inf(&corners[1]).inf(&corners[2]),
+        corners[0].sup(&corners[1]).sup(&corners[2]),
+    );
     let range = |a: usize| {
         let last = dims[a] as f64 - 1.0;
         lo[a].ceil().max(0.0) as usize..(hi[a].floor().min(last) + 1.0).max(0.0) as usize
@@ -57,12 +70,28 @@ fn cut(corners: &[Vec3; 3], dims: [usize; 3]) -> Vec<Crossing> {
     let mut out = Vec::new();
     for k in range(2) {
         for j in range(1) {
-            let p = Coord { x: j as f64, y: k as f64 };
+            let p = Coord {
+                x: j as f64,
+                y: k as f64,
+            };
             let turns = [0, 1, 2].map(|e| turn(p, flat[(e + 1) % 3], flat[(e + 2) % 3]));
-            let Some(sign) = turns.iter().try_fold(0i8, |s, t| (t.1 != 0 && s * t.1 >= 0).then_some(t.1)) else { continue };
+            let Some(sign) = turns
+                .iter()
+                .try_fold(0i8, |s, t| (t.1 != 0 && s * t.1 >= 0).then_some(t.1))
+            else {
+                continue;
+            };
             let sum: f64 = turns.iter().map(|t| t.0).sum();
-            let x = if sum != 0.0 { (0..3).map(|e| turns[e].0 / sum * corners[e].x).sum() } else { corners[0].x };
-            out.push(Crossing { row: (k * dims[1] + j) as u32, x: x.clamp(lo.x, hi.x), sign });
+            let x = if sum != 0.0 {
+                (0..3).map(|e| turns[e].0 / sum * corners[e].x).sum()
+            } else {
+                corners[0].x
+            };
+            out.push(Crossing {
+                row: (k * dims[1] + j) as u32,
+                x: x.clamp(lo.x, hi.x),
+                sign,
+            });
         }
     }
     out

@@ -26,8 +26,12 @@ pub(super) fn deviation(
     let h = grid.spacing;
     let bounds = |p: &Vec3, t: u32| {
         let [a, b, c] = mesh.corners(t as usize);
-        let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
-        (winding.at(&(p + normal * (0.25 * h))) > 0.5) != (winding.at(&(p - normal * (0.25 * h))) > 0.5)
+        let normal = (b - a)
+            .cross(&(c - a))
+            .try_normalize(0.0)
+            .unwrap_or_default();
+        (winding.at(&(p + normal * (0.25 * h))) > 0.5)
+            != (winding.at(&(p - normal * (0.25 * h))) > 0.5)
     };
     let distance = |(p, t): (Vec3, u32)| {
         let at = grid.to_grid(&p);
@@ -36,7 +40,14 @@ pub(super) fn deviation(
             return 0.0;
         }
         let distance = tree.nearest(&p, f64::INFINITY).map_or(0.0, |n| n.distance);
-        if distance < 0.5 * h || bounds(&p, t) { distance } else { 0.0 }
+        if distance < 0.5 * h || bounds(&p, t) {
+            distance
+        } else {
+            0.0
+        }
     };
-    sample_surface(mesh, samples).into_par_iter().map(distance).reduce(|| 0.0, f64::max)
+    sample_surface(mesh, samples)
+        .into_par_iter()
+        .map(distance)
+        .reduce(|| 0.0, f64::max)
 }

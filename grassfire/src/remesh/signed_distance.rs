@@ -60,9 +60,20 @@ fn mark_band(bvh: &Bvh, grid: &mut VoxelGrid<f32>) {
         while let Some((t, depth)) = stack.pop() {
             let (lo, hi) = (t[0].inf(&t[1]).inf(&t[2]), t[0].sup(&t[1]).sup(&t[2]));
             // A box around a large triangle would mark far more than the band: quarter it first.
-            if depth < 12 && (hi - lo).max() > 4.0 && (hi - lo).min() > 1.0 || depth < 12 && (hi - lo).max() > 16.0 {
-                let m = [(t[0] + t[1]) / 2.0, (t[1] + t[2]) / 2.0, (t[2] + t[0]) / 2.0];
-                for part in [[t[0], m[0], m[2]], [m[0], t[1], m[1]], [m[2], m[1], t[2]], m] {
+            if depth < 12 && (hi - lo).max() > 4.0 && (hi - lo).min() > 1.0
+                || depth < 12 && (hi - lo).max() > 16.0
+            {
+                let m = [
+                    (t[0] + t[1]) / 2.0,
+                    (t[1] + t[2]) / 2.0,
+                    (t[2] + t[0]) / 2.0,
+                ];
+                for part in [
+                    [t[0], m[0], m[2]],
+                    [m[0], t[1], m[1]],
+                    [m[2], m[1], t[2]],
+                    m,
+                ] {
                     stack.push((part, depth + 1));
                 }
                 continue;
@@ -79,7 +90,10 @@ fn mark_box(grid: &mut VoxelGrid<f32>, lo: &Vec3, hi: &Vec3) {
         if hi[a] < 0.0 || lo[a] > last {
             return;
         }
-        range[a] = [lo[a].ceil().clamp(0.0, last) as usize, hi[a].floor().clamp(0.0, last) as usize];
+        range[a] = [
+            lo[a].ceil().clamp(0.0, last) as usize,
+            hi[a].floor().clamp(0.0, last) as usize,
+        ];
     }
     for k in range[2][0]..=range[2][1] {
         for j in range[1][0]..=range[1][1] {
@@ -93,22 +107,25 @@ fn mark_box(grid: &mut VoxelGrid<f32>, lo: &Vec3, hi: &Vec3) {
 fn exact_distances(bvh: &Bvh, grid: &mut VoxelGrid<f32>) {
     let [nx, ny, _] = grid.dims;
     let (origin, h) = (grid.origin, grid.spacing);
-    grid.values.par_chunks_mut(nx).enumerate().for_each(|(row, values)| {
-        let (j, k) = (row % ny, row / ny);
-        let mut last = f64::INFINITY;
-        for (i, value) in values.iter_mut().enumerate() {
-            if *value != -1.0 {
-                last = f64::INFINITY;
-                continue;
+    grid.values
+        .par_chunks_mut(nx)
+        .enumerate()
+        .for_each(|(row, values)| {
+            let (j, k) = (row % ny, row / ny);
+            let mut last = f64::INFINITY;
+            for (i, value) in values.iter_mut().enumerate() {
+                if *value != -1.0 {
+                    last = f64::INFINITY;
+                    continue;
+                }
+                let p = origin + h * Vec3::new(i as f64, j as f64, k as f64);
+                // The distance changes by no more than one voxel from the voxel before.
+                let limit = (last + h * (1.0 + 1e-9)).min(BAND * h);
+                let found = bvh.nearest(&p, limit).map(|n| n.distance);
+                last = found.unwrap_or(f64::INFINITY);
+                *value = found.map_or(f32::INFINITY, |d| d as f32);
             }
-            let p = origin + h * Vec3::new(i as f64, j as f64, k as f64);
-            // The distance changes by no more than one voxel from the voxel before.
-            let limit = (last + h * (1.0 + 1e-9)).min(BAND * h);
-            let found = bvh.nearest(&p, limit).map(|n| n.distance);
-            last = found.unwrap_or(f64::INFINITY);
-            *value = found.map_or(f32::INFINITY, |d| d as f32);
-        }
-    });
+        });
 }
 
 /// Signs for a soup with few open edges, which `caps` close.
@@ -121,30 +138,37 @@ fn sign_by_rows(mesh: &TriMesh, caps: TriMesh, grid: &mut VoxelGrid<f32>) {
     let numbers = winding_by_rows(&closed, grid);
     let [nx, ny, _] = grid.dims;
     let (origin, h) = (grid.origin, grid.spacing);
-    grid.values.par_chunks_mut(nx).zip(numbers.par_chunks(nx)).enumerate().for_each(|(row, (values, numbers))| {
-        for (i, (value, &number)) in values.iter_mut().zip(numbers).enumerate() {
-            let p = origin + h * Vec3::new(i as f64, (row % ny) as f64, (row / ny) as f64);
-            if f64::from(number) - winding.at(&p) <= INSIDE {
-                *value = -*value;
+    grid.values
+        .par_chunks_mut(nx)
+        .zip(numbers.par_chunks(nx))
+        .enumerate()
+        .for_each(|(row, (values, numbers))| {
+            for (i, (value, &number)) in values.iter_mut().zip(numbers).enumerate() {
+                let p = origin + h * Vec3::new(i as f64, (row % ny) as f64, (row / ny) as f64);
+                if f64::from(number) - winding.at(&p) <= INSIDE {
+                    *value = -*value;
+                }
             }
-        }
-    });
+        });
 }
 
 /// Gives every voxel whose (unsigned) value satisfies `wanted` the sign of its winding number.
 fn sign_each(winding: &Winding, grid: &mut VoxelGrid<f32>, wanted: impl Fn(f32) -> bool + Sync) {
     let [nx, ny, _] = grid.dims;
     let (origin, h) = (grid.origin, grid.spacing);
-    grid.values.par_chunks_mut(nx).enumerate().for_each(|(row, values)| {
-        for (i, value) in values.iter_mut().enumerate() {
-            if wanted(*value) {
-                let p = origin + h * Vec3::new(i as f64, (row % ny) as f64, (row / ny) as f64);
-                if winding.at(&p) <= INSIDE {
-                    *value = -*value;
+    grid.values
+        .par_chunks_mut(nx)
+        .enumerate()
+        .for_each(|(row, values)| {
+            for (i, value) in values.iter_mut().enumerate() {
+                if wanted(*value) {
+                    let p = origin + h * Vec3::new(i as f64, (row % ny) as f64, (row / ny) as f64);
+                    if winding.at(&p) <= INSIDE {
+                        *value = -*value;
+                    }
                 }
             }
-        }
-    });
+        });
 }
 
 /// Signs for a soup with holes or unbalanced folds. Leaves the far voxels at +-infinity.
@@ -154,18 +178,29 @@ fn sign_by_blocks(winding: &Winding, grid: &mut VoxelGrid<f32>) {
     sign_each(winding, grid, f32::is_finite);
     let blocks = grid.dims.map(|n| n.div_ceil(BLOCK));
     let count = blocks[0] * blocks[1] * blocks[2];
-    let at = |i: usize, j: usize, k: usize| winding.at(&(origin + h * Vec3::new(i as f64, j as f64, k as f64)));
+    let at = |i: usize, j: usize, k: usize| {
+        winding.at(&(origin + h * Vec3::new(i as f64, j as f64, k as f64)))
+    };
     let values = &grid.values;
     let flips: Vec<Vec<u32>> = (0..count)
         .into_par_iter()
         .map(|b| {
-            let lo = [b % blocks[0], b / blocks[0] % blocks[1], b / (blocks[0] * blocks[1])].map(|x| x * BLOCK);
+            let lo = [
+                b % blocks[0],
+                b / blocks[0] % blocks[1],
+                b / (blocks[0] * blocks[1]),
+            ]
+            .map(|x| x * BLOCK);
             let hi = [0, 1, 2].map(|a| (lo[a] + BLOCK).min([nx, ny, nz][a]));
             let mut far = Vec::new();
             for k in lo[2]..hi[2] {
                 for j in lo[1]..hi[1] {
                     let row = (k * ny + j) * nx;
-                    far.extend((row + lo[0]..row + hi[0]).filter(|&v| values[v].is_infinite()).map(|v| v as u32));
+                    far.extend(
+                        (row + lo[0]..row + hi[0])
+                            .filter(|&v| values[v].is_infinite())
+                            .map(|v| v as u32),
+                    );
                 }
             }
             if far.is_empty() {
@@ -204,7 +239,11 @@ fn sign_by_blocks(winding: &Winding, grid: &mut VoxelGrid<f32>) {
 ///
 /// Fast sweeping, eight Gauss-Seidel sweeps in alternating directions (Zhao 2005, doi:10.1090/S0025-5718-04-01678-3).
 /// The sign of an unknown value says which side it is on; its size does not matter.
-pub(super) fn sweep(grid: &mut VoxelGrid<f32>, known: &[bool], monitor: &Monitor) -> Result<(), RemeshError> {
+pub(super) fn sweep(
+    grid: &mut VoxelGrid<f32>,
+    known: &[bool],
+    monitor: &Monitor,
+) -> Result<(), RemeshError> {
     let far = (grid.dims.iter().sum::<usize>() as f64 * grid.spacing) as f32;
     for (value, known) in grid.values.iter_mut().zip(known) {
         if !known {
@@ -224,11 +263,18 @@ pub(super) fn sweep(grid: &mut VoxelGrid<f32>, known: &[bool], monitor: &Monitor
                         continue;
                     }
                     let sign = 1f32.copysign(grid.values[v]);
-                    let value = |inside: bool, n: usize| if inside { sign * grid.values[n] } else { far };
+                    let value =
+                        |inside: bool, n: usize| if inside { sign * grid.values[n] } else { far };
                     // A neighbour across the surface counts as being on it.
-                    let x = value(i > 0, v.wrapping_sub(1)).min(value(i + 1 < nx, v + 1)).max(0.0);
-                    let y = value(j > 0, v.wrapping_sub(nx)).min(value(j + 1 < ny, v + nx)).max(0.0);
-                    let z = value(k > 0, v.wrapping_sub(nx * ny)).min(value(k + 1 < nz, v + nx * ny)).max(0.0);
+                    let x = value(i > 0, v.wrapping_sub(1))
+                        .min(value(i + 1 < nx, v + 1))
+                        .max(0.0);
+                    let y = value(j > 0, v.wrapping_sub(nx))
+                        .min(value(j + 1 < ny, v + nx))
+                        .max(0.0);
+                    let z = value(k > 0, v.wrapping_sub(nx * ny))
+                        .min(value(k + 1 < nz, v + nx * ny))
+                        .max(0.0);
                     let new = h * eikonal(x / h, y / h, z / h);
                     if new < grid.values[v].abs() {
                         grid.values[v] = new.copysign(sign);
@@ -288,12 +334,22 @@ mod tests {
         for t in 0..cube.triangles.len() {
             // Every corner a hair off its neighbours': all edges are open.
             let n = loose.points.len() as u32;
-            loose.points.extend(cube.corners(t).map(|p| p * (1.0 + 1e-9 * t as f64)));
+            loose
+                .points
+                .extend(cube.corners(t).map(|p| p * (1.0 + 1e-9 * t as f64)));
             loose.triangles.push([n, n + 1, n + 2]);
         }
         for mesh in [cube, open, loose] {
             let bvh = Bvh::new(&mesh);
-            let grid = signed_distance(&mesh, &bvh, Vec3::repeat(-5.7), 0.6, [20; 3], &Monitor::default()).expect("no cancel");
+            let grid = signed_distance(
+                &mesh,
+                &bvh,
+                Vec3::repeat(-5.7),
+                0.6,
+                [20; 3],
+                &Monitor::default(),
+            )
+            .expect("no cancel");
             for v in 0..grid.values.len() {
                 let [i, j, k] = grid.ijk(v);
                 let depth = 4.0 - grid.centre(i, j, k).abs().max();
