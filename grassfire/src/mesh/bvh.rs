@@ -70,7 +70,11 @@ impl Node {
             near = near.max(t0.min(t1));
             far = far.min(t0.max(t1));
         }
-        if near <= far * (1.0 + 1e-12) { near } else { f64::INFINITY }
+        if near <= far * (1.0 + 1e-12) {
+            near
+        } else {
+            f64::INFINITY
+        }
     }
 }
 
@@ -78,7 +82,11 @@ impl Bvh {
     /// Builds the tree in O(n log n).
     pub fn new(mesh: &TriMesh) -> Self {
         let usable = |t: &usize| {
-            mesh.triangles[*t].iter().all(|&v| mesh.points.get(v as usize).is_some_and(|p| p.iter().all(|x| x.is_finite())))
+            mesh.triangles[*t].iter().all(|&v| {
+                mesh.points
+                    .get(v as usize)
+                    .is_some_and(|p| p.iter().all(|x| x.is_finite()))
+            })
         };
         let mut items: Vec<(Vec3, u32)> = (0..mesh.triangles.len())
             .filter(usable)
@@ -93,7 +101,11 @@ impl Bvh {
         }
         let ids: Vec<u32> = items.iter().map(|item| item.1).collect();
         let corners = ids.iter().map(|&t| mesh.corners(t as usize)).collect();
-        Self { nodes, corners, ids }
+        Self {
+            nodes,
+            corners,
+            ids,
+        }
     }
 
     /// Lower and upper corner of the box around all triangles; `None` without triangles.
@@ -133,16 +145,30 @@ impl Bvh {
             let (left, right) = (index + 1, node.right);
             let dl = self.nodes[left as usize].distance_squared(p);
             let dr = self.nodes[right as usize].distance_squared(p);
-            let (near, far) = if dl <= dr { ((left, dl), (right, dr)) } else { ((right, dr), (left, dl)) };
+            let (near, far) = if dl <= dr {
+                ((left, dl), (right, dr))
+            } else {
+                ((right, dr), (left, dl))
+            };
             stack[top] = far;
             stack[top + 1] = near;
             top += 2;
         }
-        best.map(|(point, t)| Nearest { point, triangle: self.ids[t as usize], distance: limit.sqrt() })
+        best.map(|(point, t)| Nearest {
+            point,
+            triangle: self.ids[t as usize],
+            distance: limit.sqrt(),
+        })
     }
 
     /// The first triangle hit by the ray `origin + t * direction` with `from < t < to`: `(t, triangle)`.
-    pub fn first_hit(&self, origin: &Vec3, direction: &Vec3, from: f64, to: f64) -> Option<(f64, u32)> {
+    pub fn first_hit(
+        &self,
+        origin: &Vec3,
+        direction: &Vec3,
+        from: f64,
+        to: f64,
+    ) -> Option<(f64, u32)> {
         let inverse = direction.map(|x| 1.0 / x);
         let mut best: Option<(f64, u32)> = None;
         let mut limit = to;
@@ -159,7 +185,11 @@ impl Bvh {
                 let (left, right) = (index + 1, node.right);
                 let tl = self.nodes[left as usize].entry(origin, &inverse, limit);
                 let tr = self.nodes[right as usize].entry(origin, &inverse, limit);
-                let (near, far) = if tl <= tr { (left, right) } else { (right, left) };
+                let (near, far) = if tl <= tr {
+                    (left, right)
+                } else {
+                    (right, left)
+                };
                 stack.push(far);
                 stack.push(near);
                 continue;
@@ -219,13 +249,21 @@ fn build(mesh: &TriMesh, items: &mut [(Vec3, u32)], first: u32, nodes: &mut Vec<
         chi = chi.sup(centroid);
     }
     let at = nodes.len();
-    nodes.push(Node { lo, hi, first, count: items.len() as u32, right: 0 });
+    nodes.push(Node {
+        lo,
+        hi,
+        first,
+        count: items.len() as u32,
+        right: 0,
+    });
     if items.len() <= LEAF {
         return;
     }
     let axis = (chi - clo).imax();
     let middle = items.len() / 2;
-    items.select_nth_unstable_by(middle, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
+    items.select_nth_unstable_by(middle, |a, b| {
+        a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1))
+    });
     // The comparison is total (ties by index), so the two halves, and by recursion the tree, do not depend on the run.
     let (low, high) = items.split_at_mut(middle);
     build(mesh, low, first, nodes);
@@ -272,7 +310,11 @@ pub fn nearest_on_triangle(p: &Vec3, [a, b, c]: &[Vec3; 3]) -> Vec3 {
     [(a, b), (b, c), (c, a)]
         .map(|(u, v)| {
             let d = v - u;
-            let t = if d.norm_squared() > 0.0 { (d.dot(&(p - u)) / d.norm_squared()).clamp(0.0, 1.0) } else { 0.0 };
+            let t = if d.norm_squared() > 0.0 {
+                (d.dot(&(p - u)) / d.norm_squared()).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
             u + d * t
         })
         .into_iter()
@@ -301,9 +343,18 @@ mod tests {
     use proptest::prelude::*;
 
     fn soup(values: &[f64]) -> TriMesh {
-        let points: Vec<Vec3> = values.chunks_exact(3).map(|c| Vec3::new(c[0], c[1], c[2])).collect();
-        let triangles = (0..points.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-        TriMesh { points, triangles, tags: vec![] }
+        let points: Vec<Vec3> = values
+            .chunks_exact(3)
+            .map(|c| Vec3::new(c[0], c[1], c[2]))
+            .collect();
+        let triangles = (0..points.len() as u32 / 3)
+            .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
+            .collect();
+        TriMesh {
+            points,
+            triangles,
+            tags: vec![],
+        }
     }
 
     proptest! {
@@ -332,19 +383,31 @@ mod tests {
 
     #[test]
     fn degenerate_and_broken_triangles_do_no_harm() {
-        let mut mesh = soup(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0]);
+        let mut mesh = soup(&[
+            0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0,
+            5.0,
+        ]);
         mesh.points.push(Vec3::new(f64::NAN, 0.0, 0.0));
         mesh.triangles.push([0, 1, 6]);
         mesh.triangles.push([0, 1, 99]);
         let bvh = Bvh::new(&mesh);
-        let near = bvh.nearest(&Vec3::new(1.5, 1.0, 0.0), 10.0).expect("two triangles are usable");
+        let near = bvh
+            .nearest(&Vec3::new(1.5, 1.0, 0.0), 10.0)
+            .expect("two triangles are usable");
         assert!((near.distance - 1.0).abs() < 1e-12);
-        assert!(Bvh::new(&TriMesh::default()).nearest(&Vec3::zeros(), 1.0).is_none());
+        assert!(
+            Bvh::new(&TriMesh::default())
+                .nearest(&Vec3::zeros(), 1.0)
+                .is_none()
+        );
     }
 
     #[test]
     fn ray_hits_the_first_triangle() {
-        let mesh = soup(&[0.0, -1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 0.0, 1.0, 2.0, -1.0, -1.0, 2.0, 1.0, -1.0, 2.0, 0.0, 1.0]);
+        let mesh = soup(&[
+            0.0, -1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 0.0, 1.0, 2.0, -1.0, -1.0, 2.0, 1.0, -1.0, 2.0,
+            0.0, 1.0,
+        ]);
         let bvh = Bvh::new(&mesh);
         let hit = bvh.first_hit(&Vec3::new(-1.0, 0.0, 0.0), &Vec3::x(), 1e-9, 10.0);
         assert_eq!(hit, Some((1.0, 0)));

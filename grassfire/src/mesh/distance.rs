@@ -79,7 +79,10 @@ pub fn sample_surface(mesh: &TriMesh, count: usize) -> Vec<(Vec3, u32)> {
         let t = sums.partition_point(|&s| s <= wanted).min(sums.len() - 1);
         let [a, b, c] = mesh.corners(t);
         // Steps 1/g and 1/g^2 of the plastic number g.
-        let (mut u, mut v) = ((i as f64 * 0.754_877_666_246_692_7).fract(), (i as f64 * 0.569_840_290_998_053_2).fract());
+        let (mut u, mut v) = (
+            (i as f64 * 0.754_877_666_246_692_7).fract(),
+            (i as f64 * 0.569_840_290_998_053_2).fract(),
+        );
         if u + v > 1.0 {
             (u, v) = (1.0 - u, 1.0 - v);
         }
@@ -94,7 +97,12 @@ pub fn sample_surface(mesh: &TriMesh, count: usize) -> Vec<(Vec3, u32)> {
 /// 2. Each point's exact distance to the other surface comes from a [`Bvh`].
 ///
 /// Empty surfaces give an infinite distance from the other one. A mesh index out of range is not allowed.
-pub fn two_sided(a: &TriMesh, b: &TriMesh, options: &DistanceOptions, ignore: Option<&(dyn Fn(&Vec3) -> bool + Sync)>) -> Distance {
+pub fn two_sided(
+    a: &TriMesh,
+    b: &TriMesh,
+    options: &DistanceOptions,
+    ignore: Option<&(dyn Fn(&Vec3) -> bool + Sync)>,
+) -> Distance {
     let (tree_a, tree_b) = (Bvh::new(a), Bvh::new(b));
     let forward = one_sided(a, &tree_b, options.samples, ignore);
     let backward = one_sided(b, &tree_a, options.samples, ignore);
@@ -102,15 +110,33 @@ pub fn two_sided(a: &TriMesh, b: &TriMesh, options: &DistanceOptions, ignore: Op
     let all = [forward, backward].concat();
     let both = summary(&all);
     let (lo, hi) = tree_a.bounds().unwrap_or_default();
-    Distance { rms: both.rms, p95: both.p95, max: both.max, a_to_b, b_to_a, worst: worst(all, (hi - lo).norm() / 20.0) }
+    Distance {
+        rms: both.rms,
+        p95: both.p95,
+        max: both.max,
+        a_to_b,
+        b_to_a,
+        worst: worst(all, (hi - lo).norm() / 20.0),
+    }
 }
 
 /// Distances from sample points of `from` to the surface in `to`, in sample order, with their places.
-pub fn one_sided(from: &TriMesh, to: &Bvh, samples: usize, ignore: Option<&(dyn Fn(&Vec3) -> bool + Sync)>) -> Vec<(Vec3, f64)> {
+pub fn one_sided(
+    from: &TriMesh,
+    to: &Bvh,
+    samples: usize,
+    ignore: Option<&(dyn Fn(&Vec3) -> bool + Sync)>,
+) -> Vec<(Vec3, f64)> {
     sample_surface(from, samples)
         .into_par_iter()
         .filter(|(p, _)| !ignore.is_some_and(|ignore| ignore(p)))
-        .map(|(p, _)| (p, to.nearest(&p, f64::INFINITY).map_or(f64::INFINITY, |n| n.distance)))
+        .map(|(p, _)| {
+            (
+                p,
+                to.nearest(&p, f64::INFINITY)
+                    .map_or(f64::INFINITY, |n| n.distance),
+            )
+        })
         .collect()
 }
 
@@ -123,7 +149,12 @@ pub fn summary(samples: &[(Vec3, f64)]) -> DistanceSummary {
     let mut sorted: Vec<f64> = samples.iter().map(|s| s.1).collect();
     let rms = (sorted.iter().map(|d| d * d).sum::<f64>() / n as f64).sqrt();
     sorted.sort_by(f64::total_cmp);
-    DistanceSummary { rms, p95: sorted[(n - 1) * 95 / 100], max: sorted[n - 1], samples: n }
+    DistanceSummary {
+        rms,
+        p95: sorted[(n - 1) * 95 / 100],
+        max: sorted[n - 1],
+        samples: n,
+    }
 }
 
 fn worst(mut samples: Vec<(Vec3, f64)>, apart: f64) -> Vec<(Vec3, f64)> {
@@ -145,14 +176,29 @@ mod tests {
     use super::*;
 
     fn square(z: f64, size: f64) -> TriMesh {
-        let points = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| Vec3::new(x * size, y * size, z)).to_vec();
-        TriMesh { points, triangles: vec![[0, 1, 2], [0, 2, 3]], tags: vec![] }
+        let points = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+            .map(|(x, y)| Vec3::new(x * size, y * size, z))
+            .to_vec();
+        TriMesh {
+            points,
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            tags: vec![],
+        }
     }
 
     #[test]
     fn parallel_squares() {
-        let d = two_sided(&square(0.0, 1.0), &square(0.5, 1.0), &DistanceOptions { samples: 500 }, None);
-        assert!((d.rms - 0.5).abs() < 1e-12 && (d.max - 0.5).abs() < 1e-12 && (d.p95 - 0.5).abs() < 1e-12);
+        let d = two_sided(
+            &square(0.0, 1.0),
+            &square(0.5, 1.0),
+            &DistanceOptions { samples: 500 },
+            None,
+        );
+        assert!(
+            (d.rms - 0.5).abs() < 1e-12
+                && (d.max - 0.5).abs() < 1e-12
+                && (d.p95 - 0.5).abs() < 1e-12
+        );
         assert_eq!(d.a_to_b.samples, 500);
     }
 
@@ -164,7 +210,12 @@ mod tests {
         assert!((d.b_to_a.max - 2f64.sqrt()).abs() < 0.05, "{d:?}");
         assert!((d.worst[0].1 - d.max).abs() < 1e-12);
         let ignore = |p: &Vec3| p.x > 1.0 || p.y > 1.0;
-        let d = two_sided(&small, &large, &DistanceOptions { samples: 4000 }, Some(&ignore));
+        let d = two_sided(
+            &small,
+            &large,
+            &DistanceOptions { samples: 4000 },
+            Some(&ignore),
+        );
         assert!(d.max < 1e-12);
     }
 

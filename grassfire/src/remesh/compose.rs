@@ -24,7 +24,9 @@ pub(super) fn separate_opposite_empties(grid: &mut VoxelGrid<f32>, set: &mut Vox
                 continue;
             }
             let size = |c: usize| grid.values[corners[c] as usize].abs();
-            let best = |all: &mut dyn Iterator<Item = usize>| all.min_by(|&a, &b| size(a).total_cmp(&size(b)));
+            let best = |all: &mut dyn Iterator<Item = usize>| {
+                all.min_by(|&a, &b| size(a).total_cmp(&size(b)))
+            };
             let simple = best(&mut (0..8).filter(|&c| is_simple(set.mask(corners[c]))));
             let c = match simple {
                 Some(c) => c,

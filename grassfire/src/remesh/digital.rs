@@ -12,7 +12,11 @@ const fn bit(dx: i32, dy: i32, dz: i32) -> usize {
 const CENTRE: usize = 13;
 
 const fn offset(b: usize) -> [i32; 3] {
-    [(b % 3) as i32 - 1, (b / 3 % 3) as i32 - 1, (b / 9) as i32 - 1]
+    [
+        (b % 3) as i32 - 1,
+        (b / 3 % 3) as i32 - 1,
+        (b / 9) as i32 - 1,
+    ]
 }
 
 /// For each neighbour the mask of neighbours that differ from it by at most one step in each axis (`total` steps in all).
@@ -23,7 +27,11 @@ const fn adjacency(total: i32) -> [u32; 27] {
         let mut b = 0;
         while b < 27 {
             let (p, q) = (offset(a), offset(b));
-            let d = [(p[0] - q[0]).abs(), (p[1] - q[1]).abs(), (p[2] - q[2]).abs()];
+            let d = [
+                (p[0] - q[0]).abs(),
+                (p[1] - q[1]).abs(),
+                (p[2] - q[2]).abs(),
+            ];
             let far = d[0] > 1 || d[1] > 1 || d[2] > 1;
             if a != b && a != CENTRE && b != CENTRE && !far && d[0] + d[1] + d[2] <= total {
                 out[a] |= 1 << b;
@@ -94,7 +102,13 @@ pub(super) fn delta_chi(solid: u32) -> i64 {
             chi += has(0, s, 0) * has(0, 0, t) * has(0, s, t);
             chi += has(s, 0, 0) * has(0, 0, t) * has(s, 0, t);
             for u in [-1, 1] {
-                chi -= has(s, 0, 0) * has(0, t, 0) * has(0, 0, u) * has(s, t, 0) * has(0, t, u) * has(s, 0, u) * has(s, t, u);
+                chi -= has(s, 0, 0)
+                    * has(0, t, 0)
+                    * has(0, 0, u)
+                    * has(s, t, 0)
+                    * has(0, t, u)
+                    * has(s, 0, u)
+                    * has(s, t, u);
             }
         }
     }
@@ -111,7 +125,10 @@ pub(super) struct VoxelSet {
 impl VoxelSet {
     /// The voxels of a field with a positive value.
     pub(super) fn positive(dims: [usize; 3], values: &[f32]) -> Self {
-        Self { dims, solid: values.par_iter().map(|&v| v > 0.0).collect() }
+        Self {
+            dims,
+            solid: values.par_iter().map(|&v| v > 0.0).collect(),
+        }
     }
 
     /// Whether the voxel touches the border of the grid.
@@ -144,7 +161,10 @@ impl VoxelSet {
 
     /// Index offsets of the 26 neighbours.
     pub(super) fn neighbours_26(&self) -> [isize; 26] {
-        let (nx, nxy) = (self.dims[0] as isize, (self.dims[0] * self.dims[1]) as isize);
+        let (nx, nxy) = (
+            self.dims[0] as isize,
+            (self.dims[0] * self.dims[1]) as isize,
+        );
         let mut out = [0; 26];
         for (slot, b) in (0..27).filter(|&b| b != CENTRE).enumerate() {
             let [x, y, z] = offset(b).map(|v| v as isize);
@@ -155,14 +175,19 @@ impl VoxelSet {
 
     /// Index offsets of the 6 neighbours.
     pub(super) fn neighbours_6(&self) -> [isize; 6] {
-        let (nx, nxy) = (self.dims[0] as isize, (self.dims[0] * self.dims[1]) as isize);
+        let (nx, nxy) = (
+            self.dims[0] as isize,
+            (self.dims[0] * self.dims[1]) as isize,
+        );
         [-nxy, -nx, -1, 1, nx, nxy]
     }
 
     /// Euler number of the 6-connected solid: voxels - face contacts + full 2x2 squares - full 2x2x2 cubes.
     pub(super) fn chi(&self) -> i64 {
         let [nx, ny, nz] = self.dims;
-        let at = |i: usize, j: usize, k: usize| i < nx && j < ny && k < nz && self.solid[(k * ny + j) * nx + i];
+        let at = |i: usize, j: usize, k: usize| {
+            i < nx && j < ny && k < nz && self.solid[(k * ny + j) * nx + i]
+        };
         let plane = |k: usize| {
             let mut chi = 0i64;
             for j in 0..ny {
@@ -176,7 +201,8 @@ impl VoxelSet {
                     let xz = x && z && at(i + 1, j, k + 1);
                     let cube = xy && yz && xz && at(i + 1, j + 1, k + 1);
                     let count = |b: bool| i64::from(b);
-                    chi += 1 - count(x) - count(y) - count(z) + count(xy) + count(yz) + count(xz) - count(cube);
+                    chi += 1 - count(x) - count(y) - count(z) + count(xy) + count(yz) + count(xz)
+                        - count(cube);
                 }
             }
             chi
@@ -196,7 +222,12 @@ impl VoxelSet {
             if seen[start] || self.solid[start] != solid {
                 continue;
             }
-            let mut component = Component { size: 0, lo: [usize::MAX; 3], hi: [0; 3], voxels: Vec::new() };
+            let mut component = Component {
+                size: 0,
+                lo: [usize::MAX; 3],
+                hi: [0; 3],
+                voxels: Vec::new(),
+            };
             seen[start] = true;
             queue.push(start as u32);
             while let Some(v) = queue.pop() {
@@ -263,7 +294,10 @@ impl Component {
 
     /// Longest side of its box, voxels.
     pub(super) fn extent(&self) -> usize {
-        (0..3).map(|a| self.hi[a] - self.lo[a] + 1).max().unwrap_or(0)
+        (0..3)
+            .map(|a| self.hi[a] - self.lo[a] + 1)
+            .max()
+            .unwrap_or(0)
     }
 }
 
@@ -273,7 +307,10 @@ mod tests {
     use proptest::prelude::*;
 
     fn set(n: usize, solid: impl Fn(usize, usize, usize) -> bool) -> VoxelSet {
-        let mut out = VoxelSet { dims: [n; 3], solid: vec![false; n * n * n] };
+        let mut out = VoxelSet {
+            dims: [n; 3],
+            solid: vec![false; n * n * n],
+        };
         for k in 1..n - 1 {
             for j in 1..n - 1 {
                 for i in 1..n - 1 {
@@ -286,15 +323,55 @@ mod tests {
 
     #[test]
     fn ball_ring_and_shell() {
-        let ball = set(12, |i, j, k| i.abs_diff(6).pow(2) + j.abs_diff(6).pow(2) + k.abs_diff(6).pow(2) < 16);
-        assert_eq!(ball.betti(), Betti { b0: 1, b1: 0, b2: 0, chi: 1 });
-        let ring = set(12, |i, j, k| k == 5 && (i.abs_diff(6).max(j.abs_diff(6)) == 3));
-        assert_eq!(ring.betti(), Betti { b0: 1, b1: 1, b2: 0, chi: 0 });
-        let shell = set(12, |i, j, k| i.abs_diff(6).max(j.abs_diff(6)).max(k.abs_diff(6)) == 3);
-        assert_eq!(shell.betti(), Betti { b0: 1, b1: 0, b2: 1, chi: 2 });
+        let ball = set(12, |i, j, k| {
+            i.abs_diff(6).pow(2) + j.abs_diff(6).pow(2) + k.abs_diff(6).pow(2) < 16
+        });
+        assert_eq!(
+            ball.betti(),
+            Betti {
+                b0: 1,
+                b1: 0,
+                b2: 0,
+                chi: 1
+            }
+        );
+        let ring = set(12, |i, j, k| {
+            k == 5 && (i.abs_diff(6).max(j.abs_diff(6)) == 3)
+        });
+        assert_eq!(
+            ring.betti(),
+            Betti {
+                b0: 1,
+                b1: 1,
+                b2: 0,
+                chi: 0
+            }
+        );
+        let shell = set(12, |i, j, k| {
+            i.abs_diff(6).max(j.abs_diff(6)).max(k.abs_diff(6)) == 3
+        });
+        assert_eq!(
+            shell.betti(),
+            Betti {
+                b0: 1,
+                b1: 0,
+                b2: 1,
+                chi: 2
+            }
+        );
         // Two voxels that share an edge only are two bodies, and the empty side stays connected.
-        let pair = set(6, |i, j, k| k == 2 && ((i, j) == (2, 2) || (i, j) == (3, 3)));
-        assert_eq!(pair.betti(), Betti { b0: 2, b1: 0, b2: 0, chi: 2 });
+        let pair = set(6, |i, j, k| {
+            k == 2 && ((i, j) == (2, 2) || (i, j) == (3, 3))
+        });
+        assert_eq!(
+            pair.betti(),
+            Betti {
+                b0: 2,
+                b1: 0,
+                b2: 0,
+                chi: 2
+            }
+        );
     }
 
     proptest! {

@@ -10,7 +10,9 @@ pub enum RemeshError {
     #[error("the mesh has no triangle with finite corners and positive extent")]
     Empty,
     /// Nowhere does the surface enclose anything.
-    #[error("not a solid: the surface encloses nothing; at {sampled} places the winding number lies between {lowest:.3} and {highest:.3}, more than 0.5 is wanted")]
+    #[error(
+        "not a solid: the surface encloses nothing; at {sampled} places the winding number lies between {lowest:.3} and {highest:.3}, more than 0.5 is wanted"
+    )]
     NotSolid {
         /// Smallest winding number met.
         lowest: f64,
@@ -42,7 +44,9 @@ pub enum RemeshError {
         wanted: &'static str,
     },
     /// A density grid whose parts do not fit together.
-    #[error("the density grid is {dims:?} with {values} values and spacing {spacing} mm; at least 2 voxels a side, one value a voxel and a positive spacing are wanted")]
+    #[error(
+        "the density grid is {dims:?} with {values} values and spacing {spacing} mm; at least 2 voxels a side, one value a voxel and a positive spacing are wanted"
+    )]
     BadGrid {
         /// Voxels along x, y, z.
         dims: [usize; 3],
@@ -60,7 +64,9 @@ pub enum RemeshError {
         iso: f64,
     },
     /// All material was thinner than the grid can hold or smaller than `min_tunnel`.
-    #[error("nothing is left at a voxel of {voxel} mm: every part is thinner than that or smaller than {width} mm")]
+    #[error(
+        "nothing is left at a voxel of {voxel} mm: every part is thinner than that or smaller than {width} mm"
+    )]
     Vanished {
         /// Voxel edge, mm.
         voxel: f64,
@@ -87,13 +93,21 @@ impl RemeshError {
     /// What to try next.
     pub fn hint(&self) -> Option<String> {
         match self {
-            Self::NotSolid { lowest, .. } if *lowest < -0.5 => Some("the normals point inward: flip the mesh".into()),
-            Self::NotSolid { .. } => Some("close the surface, or give the sheet a thickness, before it is remeshed".into()),
-            Self::TooManyVoxels { finest, .. } => Some(format!("set remesh.voxel to {finest:.4} or more, or raise remesh.max_voxels")),
+            Self::NotSolid { lowest, .. } if *lowest < -0.5 => {
+                Some("the normals point inward: flip the mesh".into())
+            }
+            Self::NotSolid { .. } => Some(
+                "close the surface, or give the sheet a thickness, before it is remeshed".into(),
+            ),
+            Self::TooManyVoxels { finest, .. } => Some(format!(
+                "set remesh.voxel to {finest:.4} or more, or raise remesh.max_voxels"
+            )),
             Self::Vanished { .. } => Some("set a smaller remesh.voxel or remesh.min_tunnel".into()),
             Self::NoMaterial { .. } => Some("lower the density threshold".into()),
             Self::Empty => Some("check that the file holds a surface".into()),
-            Self::Topology { .. } | Self::Surface(_) => Some("try a slightly different remesh.voxel".into()),
+            Self::Topology { .. } | Self::Surface(_) => {
+                Some("try a slightly different remesh.voxel".into())
+            }
             Self::BadOption { .. } | Self::BadGrid { .. } | Self::Cancelled(_) => None,
         }
     }

@@ -67,17 +67,27 @@ fn cases() -> Vec<Case> {
         .map(|case| {
             let mut label: [u8; 12] = std::array::from_fn(|e| {
                 let (a, b) = edge_corners(e);
-                if (case >> a ^ case >> b) & 1 == 1 { e as u8 } else { NONE }
+                if (case >> a ^ case >> b) & 1 == 1 {
+                    e as u8
+                } else {
+                    NONE
+                }
             });
             let mut link = |a: usize, b: usize| {
                 let (from, to) = (label[a].max(label[b]), label[a].min(label[b]));
-                label.iter_mut().filter(|l| **l == from).for_each(|l| *l = to);
+                label
+                    .iter_mut()
+                    .filter(|l| **l == from)
+                    .for_each(|l| *l = to);
             };
             for face in 0..6 {
                 let q = face_corners(face / 2, face % 2);
                 if is_ambiguous(case, face / 2, face % 2) {
                     for i in (0..4).filter(|&i| case >> q[i] & 1 == 1) {
-                        link(edge_between(q[(i + 3) % 4], q[i]), edge_between(q[i], q[(i + 1) % 4]));
+                        link(
+                            edge_between(q[(i + 3) % 4], q[i]),
+                            edge_between(q[i], q[(i + 1) % 4]),
+                        );
                     }
                     continue;
                 }
@@ -92,8 +102,12 @@ fn cases() -> Vec<Case> {
             let mut names: Vec<u8> = label.iter().copied().filter(|&l| l != NONE).collect();
             names.sort_unstable();
             names.dedup();
-            let component = label.map(|l| names.iter().position(|&n| n == l).map_or(NONE, |n| n as u8));
-            Case { component, count: names.len() as u8 }
+            let component =
+                label.map(|l| names.iter().position(|&n| n == l).map_or(NONE, |n| n as u8));
+            Case {
+                component,
+                count: names.len() as u8,
+            }
         })
         .collect()
 }
@@ -125,7 +139,12 @@ struct Vertex {
 ///    would share two dual edges, these get a vertex of their own each, so the surface is manifold in every case.
 /// 4. Vertices of intersecting triangles move toward the mean of the crossings and on toward the middle of the edges.
 pub(super) fn surface(grid: &VoxelGrid<f32>, set: &VoxelSet, repair: bool) -> Surface {
-    let mut cells = Cells { grid, set, cases: cases(), first: vec![u32::MAX; set.solid.len()] };
+    let mut cells = Cells {
+        grid,
+        set,
+        cases: cases(),
+        first: vec![u32::MAX; set.solid.len()],
+    };
     let vertices = cells.number();
     let mut points: Vec<Vec3> = vertices.iter().map(|v| v.best).collect();
     let polygons = cells.polygons(&mut points);
@@ -140,8 +159,16 @@ pub(super) fn surface(grid: &VoxelGrid<f32>, set: &VoxelSet, repair: bool) -> Su
         if bad.is_empty() || round == ROUNDS {
             break;
         }
-        for v in bad.into_iter().map(|v| v as usize).filter(|&v| v < vertices.len()) {
-            let target = if round == 0 { vertices[v].mean } else { vertices[v].safe };
+        for v in bad
+            .into_iter()
+            .map(|v| v as usize)
+            .filter(|&v| v < vertices.len())
+        {
+            let target = if round == 0 {
+                vertices[v].mean
+            } else {
+                vertices[v].safe
+            };
             let at = points[v];
             points[v] = at + (target - at) * if round == 0 { 1.0 } else { 0.5 };
         }
@@ -153,7 +180,12 @@ pub(super) fn surface(grid: &VoxelGrid<f32>, set: &VoxelSet, repair: bool) -> Su
 impl Cells<'_> {
     fn case(&self, cell: usize) -> usize {
         let [nx, ny, _] = self.grid.dims;
-        (0..8).map(|c| usize::from(self.set.solid[cell + (c & 1) + (c >> 1 & 1) * nx + (c >> 2) * nx * ny]) << c).sum()
+        (0..8)
+            .map(|c| {
+                usize::from(self.set.solid[cell + (c & 1) + (c >> 1 & 1) * nx + (c >> 2) * nx * ny])
+                    << c
+            })
+            .sum()
     }
 
     /// Numbers the vertices cell by cell and places them.
@@ -177,7 +209,10 @@ impl Cells<'_> {
             })
             .collect();
         let active: Vec<(u32, u8)> = active.into_iter().flatten().collect();
-        let placed: Vec<Vec<Vertex>> = active.par_iter().map(|&(cell, case)| this.place(cell as usize, case as usize)).collect();
+        let placed: Vec<Vec<Vertex>> = active
+            .par_iter()
+            .map(|&(cell, case)| this.place(cell as usize, case as usize))
+            .collect();
         let mut next = 0;
         for (&(cell, _), vertices) in active.iter().zip(&placed) {
             self.first[cell as usize] = next;
@@ -196,9 +231,15 @@ impl Cells<'_> {
     fn crossing(&self, cell: usize, e: usize) -> Vec3 {
         let (a, b) = edge_corners(e);
         let ((pa, va), (pb, vb)) = (self.corner(cell, a), self.corner(cell, b));
-        let (fa, fb) = (f64::from(self.grid.values[va]), f64::from(self.grid.values[vb]));
+        let (fa, fb) = (
+            f64::from(self.grid.values[va]),
+            f64::from(self.grid.values[vb]),
+        );
         let t = (fa / (fa - fb)).clamp(CLEAR, 1.0 - CLEAR);
-        let (pa, pb) = (self.grid.centre(pa[0], pa[1], pa[2]), self.grid.centre(pb[0], pb[1], pb[2]));
+        let (pa, pb) = (
+            self.grid.centre(pa[0], pa[1], pa[2]),
+            self.grid.centre(pb[0], pb[1], pb[2]),
+        );
         pa + (pb - pa) * if t.is_finite() { t } else { 0.5 }
     }
 
@@ -208,7 +249,9 @@ impl Cells<'_> {
         let table = &self.cases[case];
         (0..table.count)
             .map(|component| {
-                let edges: Vec<usize> = (0..12).filter(|&e| table.component[e] == component).collect();
+                let edges: Vec<usize> = (0..12)
+                    .filter(|&e| table.component[e] == component)
+                    .collect();
                 let points: Vec<Vec3> = edges.iter().map(|&e| self.crossing(cell, e)).collect();
                 let count = edges.len() as f64;
                 let mean = points.iter().sum::<Vec3>() / count;
@@ -216,15 +259,26 @@ impl Cells<'_> {
                     .iter()
                     .map(|&e| {
                         let (a, b) = edge_corners(e);
-                        let at = |c: usize| Vec3::new((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2) as f64);
+                        let at = |c: usize| {
+                            Vec3::new((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2) as f64)
+                        };
                         lo + (at(a) + at(b)) / 2.0 * h
                     })
                     .sum::<Vec3>()
                     / count;
                 // Two components in one cell must not cross: the means of their crossings do not.
-                let best = if table.count > 1 { mean } else { self.minimize(&points, &mean) };
-                let clamp = |x: f64, a: usize| x.clamp(lo[a] + CLEAR * h, lo[a] + (1.0 - CLEAR) * h);
-                Vertex { best: Vec3::new(clamp(best.x, 0), clamp(best.y, 1), clamp(best.z, 2)), mean, safe }
+                let best = if table.count > 1 {
+                    mean
+                } else {
+                    self.minimize(&points, &mean)
+                };
+                let clamp =
+                    |x: f64, a: usize| x.clamp(lo[a] + CLEAR * h, lo[a] + (1.0 - CLEAR) * h);
+                Vertex {
+                    best: Vec3::new(clamp(best.x, 0), clamp(best.y, 1), clamp(best.z, 2)),
+                    mean,
+                    safe,
+                }
             })
             .collect()
     }
@@ -264,7 +318,8 @@ impl Cells<'_> {
                 // The border is empty, so a crossed edge has all four cells.
                 let (u, t) = ((axis + 1) % 3, (axis + 2) % 3);
                 // Cells in counter-clockwise order about +axis; in the cell the edge has the opposite bits.
-                let mut ring = [(1, 1), (0, 1), (0, 0), (1, 0)].map(|(bu, bt)| (v - bu * stride[u] - bt * stride[t], 4 * axis + bu + 2 * bt));
+                let mut ring = [(1, 1), (0, 1), (0, 0), (1, 0)]
+                    .map(|(bu, bt)| (v - bu * stride[u] - bt * stride[t], 4 * axis + bu + 2 * bt));
                 if self.set.solid[w] {
                     ring.reverse();
                 }
@@ -298,7 +353,11 @@ impl Cells<'_> {
     /// The face between two cells, as (cell, its face's axis) with the face on the cell's high side, when the two cells
     /// are joined through it by two dual edges between the same two vertices.
     fn doubled(&self, here: (usize, usize), next: (usize, usize)) -> Option<(usize, usize)> {
-        let ((low, low_edge), (high, high_edge)) = if here.0 < next.0 { (here, next) } else { (next, here) };
+        let ((low, low_edge), (high, high_edge)) = if here.0 < next.0 {
+            (here, next)
+        } else {
+            (next, here)
+        };
         let dims = self.grid.dims;
         let axis = match high - low {
             1 => 0,
@@ -312,7 +371,9 @@ impl Cells<'_> {
         let whole = |cell: usize, side: usize, edge: usize| {
             let table = &self.cases[self.case(cell)];
             let q = face_corners(axis, side);
-            (0..4).all(|i| table.component[edge_between(q[i], q[(i + 1) % 4])] == table.component[edge])
+            (0..4).all(|i| {
+                table.component[edge_between(q[i], q[(i + 1) % 4])] == table.component[edge]
+            })
         };
         (whole(low, 1, low_edge) && whole(high, 0, high_edge)).then_some((low, axis))
     }
@@ -320,8 +381,13 @@ impl Cells<'_> {
     /// Between the two crossings next to the solid corner `solid` of the high face of `cell` along `axis`.
     fn face_middle(&self, cell: usize, axis: usize, solid: usize) -> Vec3 {
         let q = face_corners(axis, 1);
-        let i = (0..4).find(|&i| self.corner(cell, q[i]).1 == solid).unwrap_or(0);
-        let edges = [edge_between(q[(i + 3) % 4], q[i]), edge_between(q[i], q[(i + 1) % 4])];
+        let i = (0..4)
+            .find(|&i| self.corner(cell, q[i]).1 == solid)
+            .unwrap_or(0);
+        let edges = [
+            edge_between(q[(i + 3) % 4], q[i]),
+            edge_between(q[i], q[(i + 1) % 4]),
+        ];
         (self.crossing(cell, edges[0]) + self.crossing(cell, edges[1])) / 2.0
     }
 }
@@ -330,19 +396,33 @@ impl Cells<'_> {
 fn triangulate(grid: &VoxelGrid<f32>, points: &[Vec3], polygons: &[Vec<u32>]) -> TriMesh {
     let normal = |t: [u32; 3]| {
         let [a, b, c] = t.map(|v| points[v as usize]);
-        (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default()
+        (b - a)
+            .cross(&(c - a))
+            .try_normalize(0.0)
+            .unwrap_or_default()
     };
     let h2 = grid.spacing * grid.spacing;
     let split = |p: &Vec<u32>| -> Vec<[u32; 3]> {
-        let &[a, b, c, d] = &p[..] else { return vec![[p[0], p[1], p[2]]] };
+        let &[a, b, c, d] = &p[..] else {
+            return vec![[p[0], p[1], p[2]]];
+        };
         let (first, second) = ([[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]);
         let score = |pair: &[[u32; 3]; 2], x: u32, y: u32| {
-            normal(pair[0]).dot(&normal(pair[1])) - 0.1 * (points[x as usize] - points[y as usize]).norm_squared() / h2
+            normal(pair[0]).dot(&normal(pair[1]))
+                - 0.1 * (points[x as usize] - points[y as usize]).norm_squared() / h2
         };
-        if score(&first, a, c) >= score(&second, b, d) { first.to_vec() } else { second.to_vec() }
+        if score(&first, a, c) >= score(&second, b, d) {
+            first.to_vec()
+        } else {
+            second.to_vec()
+        }
     };
     let triangles: Vec<Vec<[u32; 3]>> = polygons.par_iter().with_min_len(1024).map(split).collect();
-    TriMesh { points: points.to_vec(), triangles: triangles.into_iter().flatten().collect(), tags: Vec::new() }
+    TriMesh {
+        points: points.to_vec(),
+        triangles: triangles.into_iter().flatten().collect(),
+        tags: Vec::new(),
+    }
 }
 
 #[cfg(test)]
@@ -356,7 +436,11 @@ mod tests {
         let mut grid = VoxelGrid::filled(Vec3::zeros(), 1.0, [n + 4; 3], -1f32);
         for (b, &solid) in bits.iter().enumerate() {
             let v = grid.index(b % n + 2, b / n % n + 2, b / (n * n) + 2);
-            grid.values[v] = if solid { 0.3 + (b % 7) as f32 * 0.1 } else { -0.4 - (b % 5) as f32 * 0.1 };
+            grid.values[v] = if solid {
+                0.3 + (b % 7) as f32 * 0.1
+            } else {
+                -0.4 - (b % 5) as f32 * 0.1
+            };
         }
         grid
     }
@@ -387,7 +471,12 @@ mod tests {
         let set = VoxelSet::positive(grid.dims, &grid.values);
         let out = surface(&grid, &set, true);
         assert_eq!(out.intersecting, 0);
-        assert!(out.mesh.points.iter().all(|p| (p.norm() - 9.3).abs() < 0.05));
+        assert!(
+            out.mesh
+                .points
+                .iter()
+                .all(|p| (p.norm() - 9.3).abs() < 0.05)
+        );
         let solid = Solid::try_from(out.mesh).expect("a ball");
         assert_eq!(solid.euler(), 2);
         let exact = 4.0 / 3.0 * std::f64::consts::PI * 9.3f64.powi(3);

@@ -40,7 +40,10 @@ fn intersect(mesh: &TriMesh, s: usize, t: usize) -> bool {
         2 => {
             let normal = |t: usize| {
                 let [a, b, c] = mesh.corners(t);
-                (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default()
+                (b - a)
+                    .cross(&(c - a))
+                    .try_normalize(0.0)
+                    .unwrap_or_default()
             };
             normal(s).dot(&normal(t)) < -0.9999
         }
@@ -51,20 +54,37 @@ fn intersect(mesh: &TriMesh, s: usize, t: usize) -> bool {
 /// Whether an edge of `a` that shares no vertex with `b` crosses triangle `b`.
 fn crosses(mesh: &TriMesh, a: [u32; 3], b: [u32; 3]) -> bool {
     let [p, q, r] = b.map(|v| coordinate(&mesh.points[v as usize]));
-    let side = a.map(|v| if b.contains(&v) { 0.0 } else { orient3d(p, q, r, coordinate(&mesh.points[v as usize])) });
+    let side = a.map(|v| {
+        if b.contains(&v) {
+            0.0
+        } else {
+            orient3d(p, q, r, coordinate(&mesh.points[v as usize]))
+        }
+    });
     (0..3).any(|k| {
         let (u, v) = (a[k], a[(k + 1) % 3]);
         if b.contains(&u) || b.contains(&v) || side[k] * side[(k + 1) % 3] >= 0.0 {
             return false;
         }
-        let (x, y) = (coordinate(&mesh.points[u as usize]), coordinate(&mesh.points[v as usize]));
-        let turns = [orient3d(x, y, p, q), orient3d(x, y, q, r), orient3d(x, y, r, p)];
+        let (x, y) = (
+            coordinate(&mesh.points[u as usize]),
+            coordinate(&mesh.points[v as usize]),
+        );
+        let turns = [
+            orient3d(x, y, p, q),
+            orient3d(x, y, q, r),
+            orient3d(x, y, r, p),
+        ];
         turns.iter().all(|&d| d >= 0.0) || turns.iter().all(|&d| d <= 0.0)
     })
 }
 
 fn coordinate(p: &Vec3) -> Coord3D<f64> {
-    Coord3D { x: p.x, y: p.y, z: p.z }
+    Coord3D {
+        x: p.x,
+        y: p.y,
+        z: p.z,
+    }
 }
 
 #[cfg(test)]
@@ -73,7 +93,14 @@ mod tests {
 
     #[test]
     fn crossing_and_touching() {
-        let points = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.5, 0.5, -1.0], [0.5, 0.5, 1.0], [3.0, 3.0, 1.0]];
+        let points = [
+            [0.0, 0.0, 0.0],
+            [2.0, 0.0, 0.0],
+            [0.0, 2.0, 0.0],
+            [0.5, 0.5, -1.0],
+            [0.5, 0.5, 1.0],
+            [3.0, 3.0, 1.0],
+        ];
         let mut mesh = TriMesh {
             points: points.map(Vec3::from).to_vec(),
             triangles: vec![[0, 1, 2], [3, 4, 5]],

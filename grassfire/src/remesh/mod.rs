@@ -1,5 +1,6 @@
 //! Voxel remesh: soup in, closed solid and signed distance field out, topological noise removed.
 
+mod closing;
 mod compose;
 mod crossings;
 mod deviation;
@@ -7,6 +8,7 @@ mod digital;
 mod error;
 mod extract;
 mod intersect;
+mod islands;
 mod noise;
 mod options;
 mod patch;
@@ -89,7 +91,11 @@ pub struct Remeshed {
 ///
 /// # Errors
 /// See [`RemeshError`]: nothing enclosed, too many voxels, bad options, cancelled.
-pub fn remesh(mesh: &TriMesh, options: &RemeshOptions, monitor: &Monitor) -> Result<Remeshed, RemeshError> {
+pub fn remesh(
+    mesh: &TriMesh,
+    options: &RemeshOptions,
+    monitor: &Monitor,
+) -> Result<Remeshed, RemeshError> {
     check(options)?;
     let mesh = usable(mesh)?;
     let source = resolution::source_lattice(&mesh);
@@ -119,9 +125,17 @@ pub fn remesh_density(
 }
 
 fn check(options: &RemeshOptions) -> Result<(), RemeshError> {
-    let bad = |name, value, wanted| Err(RemeshError::BadOption { name, value, wanted });
+    let bad = |name, value, wanted| {
+        Err(RemeshError::BadOption {
+            name,
+            value,
+            wanted,
+        })
+    };
     match options.voxel {
-        Some(voxel) if !(voxel.is_finite() && voxel > 0.0) => return bad("voxel", voxel, "a positive length"),
+        Some(voxel) if !(voxel.is_finite() && voxel > 0.0) => {
+            return bad("voxel", voxel, "a positive length");
+        }
         _ => {}
     }
     if !(0.0..=1e3).contains(&options.min_tunnel) {
@@ -135,32 +149,78 @@ fn check(options: &RemeshOptions) -> Result<(), RemeshError> {
 
 /// The triangles with valid indices and finite corners.
 fn usable(mesh: &TriMesh) -> Result<TriMesh, RemeshError> {
-    let sound = |v: &u32| mesh.points.get(*v as usize).is_some_and(|p| p.iter().all(|x| x.abs() < 1e30));
-    let triangles: Vec<[u32; 3]> = mesh.triangles.iter().filter(|t| t.iter().all(sound)).copied().collect();
-    let points = mesh.points.iter().map(|p| if p.iter().all(|x| x.abs() < 1e30) { *p } else { Vec3::zeros() }).collect();
-    let mesh = TriMesh { points, triangles, tags: Vec::new() };
-    if mesh.triangles.is_empty() || mesh.area() <= 0.0 { Err(RemeshError::Empty) } else { Ok(mesh) }
+    let sound = |v: &u32| {
+        mesh.points
+            .get(*v as usize)
+            .is_some_and(|p| p.iter().all(|x| x.abs() < 1e30))
+    };
+    let triangles: Vec<[u32; 3]> = mesh
+        .triangles
+        .iter()
+        .filter(|t| t.iter().all(sound))
+        .copied()
+        .collect();
+    let points = mesh
+        .points
+        .iter()
+        .map(|p| {
+            if p.iter().all(|x| x.abs() < 1e30) {
+                *p
+            } else {
+                Vec3::zeros()
+            }
+        })
+        .collect();
+    let mesh = TriMesh {
+        points,
+        triangles,
+        tags: Vec::new(),
+    };
+    if mesh.triangles.is_empty() || mesh.area() <= 0.0 {
+        Err(RemeshError::Empty)
+    } else {
+        Ok(mesh)
+    }
 }
 
-fn padded(density: &VoxelGrid<f32>, iso: f64, options: &RemeshOptions, monitor: &Monitor) -> Result<VoxelGrid<f32>, RemeshError> {
+fn padded(
+    density: &VoxelGrid<f32>,
+    iso: f64,
+    options: &RemeshOptions,
+    monitor: &Monitor,
+) -> Result<VoxelGrid<f32>, RemeshError> {
     let (dims, spacing) = (density.dims, density.spacing);
     let wanted = dims.iter().map(|&n| n as f64 + 4.0).product::<f64>();
     let fits = dims.iter().try_fold(1usize, |n, &d| n.checked_mul(d)) == Some(density.values.len());
     if !fits || dims.iter().any(|&n| n < 2) || !(spacing.is_finite() && spacing > 0.0) {
-        return Err(RemeshError::BadGrid { dims, values: density.values.len(), spacing });
+        return Err(RemeshError::BadGrid {
+            dims,
+            values: density.values.len(),
+            spacing,
+        });
     }
     if wanted > options.max_voxels as f64 {
         let finest = spacing * (wanted / options.max_voxels.max(1) as f64).cbrt();
-        return Err(RemeshError::TooManyVoxels { voxel: spacing, wanted, limit: options.max_voxels, finest });
+        return Err(RemeshError::TooManyVoxels {
+            voxel: spacing,
+            wanted,
+            limit: options.max_voxels,
+            finest,
+        });
     }
     let finite = density.values.iter().filter(|v| v.is_finite());
-    let highest = finite.clone().fold(f64::NEG_INFINITY, |m, &v| m.max(f64::from(v)));
+    let highest = finite
+        .clone()
+        .fold(f64::NEG_INFINITY, |m, &v| m.max(f64::from(v)));
     if iso.is_nan() || highest <= iso {
         return Err(RemeshError::NoMaterial { highest, iso });
     }
     let broken = density.values.len() - finite.count();
     if broken > 0 {
-        monitor.warn(STAGE, format!("{broken} density values are not finite and count as empty"));
+        monitor.warn(
+            STAGE,
+            format!("{broken} density values are not finite and count as empty"),
+        );
     }
     // A full voxel at the border ends at its outer face: half-way to an outside as far below the threshold as full is above.
     let outside = (-(1.0 - iso).abs().max(1e-3) * spacing) as f32;
@@ -176,11 +236,18 @@ fn padded(density: &VoxelGrid<f32>, iso: f64, options: &RemeshOptions, monitor: 
     Ok(out)
 }
 
-fn remesh_on(mesh: &TriMesh, source: Option<f64>, options: &RemeshOptions, monitor: &Monitor) -> Result<Remeshed, RemeshError> {
+fn remesh_on(
+    mesh: &TriMesh,
+    source: Option<f64>,
+    options: &RemeshOptions,
+    monitor: &Monitor,
+) -> Result<Remeshed, RemeshError> {
     monitor.step(STAGE, "resolution", 0.0)?;
     let bvh = Bvh::new(mesh);
     let (lo, hi) = bvh.bounds().ok_or(RemeshError::Empty)?;
-    let voxel = options.voxel.unwrap_or_else(|| resolution::voxel_for(mesh, &bvh, options));
+    let voxel = options
+        .voxel
+        .unwrap_or_else(|| resolution::voxel_for(mesh, &bvh, options));
     if (hi - lo).max() <= 0.0 || voxel <= 0.0 {
         return Err(RemeshError::Empty);
     }
@@ -200,7 +267,7 @@ fn remesh_on(mesh: &TriMesh, source: Option<f64>, options: &RemeshOptions, monit
         return Err(RemeshError::Vanished { voxel, width });
     }
     if !noise.changes.is_empty() {
-        refresh(&mut field, &set, &noise.touched, monitor)?;
+        noise::refresh(&mut field, &set, &noise.touched, monitor)?;
     }
     let forced = compose::separate_opposite_empties(&mut field, &mut set);
     if forced > 0 {
@@ -209,35 +276,62 @@ fn remesh_on(mesh: &TriMesh, source: Option<f64>, options: &RemeshOptions, monit
     monitor.step(STAGE, "surface", 0.85)?;
     let surface = extract::surface(&field, &set, true);
     if surface.intersecting > 0 {
-        monitor.warn(STAGE, format!("{} vertices of the new surface belong to intersecting triangles (0 wanted)", surface.intersecting));
+        monitor.warn(
+            STAGE,
+            format!(
+                "{} vertices of the new surface belong to intersecting triangles (0 wanted)",
+                surface.intersecting
+            ),
+        );
     }
     let solid = Solid::try_from(surface.mesh)?;
     let after = set.betti();
     if solid.euler() != 2 * after.chi {
-        return Err(RemeshError::Topology { surface: solid.euler(), voxels: after.chi });
+        return Err(RemeshError::Topology {
+            surface: solid.euler(),
+            voxels: after.chi,
+        });
     }
     monitor.step(STAGE, "distance", 0.95)?;
-    let distance_max = deviation::deviation(&fine, &bvh, &solid, &field, &noise.touched, options.samples);
+    let (islands, lost) =
+        islands::lost_islands(mesh, &field, width.max(2.0 * voxel), &noise.changes);
+    noise.changes.extend(islands);
+    let skip = |v: usize, t: u32| noise.touched[v] || lost[t as usize];
+    let distance_max = deviation::deviation(mesh, &bvh, &solid, &field, skip, options.samples);
     noise.changes.sort_by(|a, b| b.size.total_cmp(&a.size));
-    Ok(Remeshed { solid, field, genus_before: noise.before.b1, genus_after: after.b1, changes: noise.changes, distance_max })
+    Ok(Remeshed {
+        solid,
+        field,
+        genus_before: noise.before.b1,
+        genus_after: after.b1,
+        changes: noise.changes,
+        distance_max,
+    })
 }
 
 /// Halves the longest edge of every triangle until it is at most `length`: long triangles make poor boxes, and every
 /// query would visit most of them. Neighbours are split at the same points.
 fn split_long_edges(mesh: &TriMesh, length: f64) -> TriMesh {
-    let mut out = TriMesh { points: mesh.points.clone(), ..TriMesh::default() };
+    let mut out = TriMesh {
+        points: mesh.points.clone(),
+        ..TriMesh::default()
+    };
     let mut stack = mesh.triangles.clone();
     stack.reverse();
     while let Some(t) = stack.pop() {
-        let edge = |k: usize| (out.points[t[k] as usize] - out.points[t[(k + 1) % 3] as usize]).norm();
-        let longest = (0..3).max_by(|&a, &b| edge(a).total_cmp(&edge(b))).unwrap_or(0);
+        let edge =
+            |k: usize| (out.points[t[k] as usize] - out.points[t[(k + 1) % 3] as usize]).norm();
+        let longest = (0..3)
+            .max_by(|&a, &b| edge(a).total_cmp(&edge(b)))
+            .unwrap_or(0);
         if edge(longest) <= length || out.triangles.len() + stack.len() >= PIECES {
             out.triangles.push(t);
             continue;
         }
         let [a, b, c] = [t[longest], t[(longest + 1) % 3], t[(longest + 2) % 3]];
         let middle = out.points.len() as u32;
-        out.points.push((out.points[a as usize] + out.points[b as usize]) / 2.0);
+        out.points
+            .push((out.points[a as usize] + out.points[b as usize]) / 2.0);
         stack.push([middle, b, c]);
         stack.push([a, middle, c]);
     }
@@ -258,19 +352,11 @@ fn not_solid(bvh: &Bvh, field: &VoxelGrid<f32>) -> RemeshError {
     let all = winding.at_all(&places);
     let lowest = all.iter().copied().fold(f64::INFINITY, f64::min);
     let highest = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    RemeshError::NotSolid { lowest, highest, sampled: places.len() }
-}
-
-/// Distances around changes: values next to the surface and the untouched band are kept, the rest is swept anew.
-fn refresh(field: &mut VoxelGrid<f32>, set: &VoxelSet, touched: &[bool], monitor: &Monitor) -> Result<(), RemeshError> {
-    let band = ((signed_distance::BAND - 0.5) * field.spacing) as f32;
-    let steps = set.neighbours_26();
-    let at_surface = |v: usize| {
-        !set.on_border(v as u32) && steps.iter().any(|s| set.solid[(v as isize + s) as usize] != set.solid[v])
-    };
-    let known: Vec<bool> =
-        (0..touched.len()).map(|v| if touched[v] { at_surface(v) } else { field.values[v].abs() <= band }).collect();
-    signed_distance::sweep(field, &known, monitor)
+    RemeshError::NotSolid {
+        lowest,
+        highest,
+        sampled: places.len(),
+    }
 }
 
 #[cfg(test)]
@@ -279,22 +365,56 @@ mod tests {
 
     /// A cube about the origin.
     pub(super) fn cube(side: f64) -> TriMesh {
-        let points = (0..8).map(|c| Vec3::new(f64::from(c & 1), f64::from(c >> 1 & 1), f64::from(c >> 2)).add_scalar(-0.5) * side).collect();
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let triangles = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
-        TriMesh { points, triangles, tags: vec![] }
+        let points = (0..8)
+            .map(|c| {
+                Vec3::new(f64::from(c & 1), f64::from(c >> 1 & 1), f64::from(c >> 2))
+                    .add_scalar(-0.5)
+                    * side
+            })
+            .collect();
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        let triangles = quads
+            .iter()
+            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
+            .collect();
+        TriMesh {
+            points,
+            triangles,
+            tags: vec![],
+        }
     }
 
     fn remesh_at(mesh: &TriMesh, voxel: f64) -> Result<Remeshed, RemeshError> {
-        remesh(mesh, &RemeshOptions { voxel: Some(voxel), ..RemeshOptions::default() }, &Monitor::default())
+        remesh(
+            mesh,
+            &RemeshOptions {
+                voxel: Some(voxel),
+                ..RemeshOptions::default()
+            },
+            &Monitor::default(),
+        )
     }
 
     #[test]
     fn a_cube_keeps_volume_and_place() {
         let out = remesh_at(&cube(10.0), 0.37).expect("a cube");
-        assert!((out.solid.volume() - 1000.0).abs() < 10.0, "{}", out.solid.volume());
+        assert!(
+            (out.solid.volume() - 1000.0).abs() < 10.0,
+            "{}",
+            out.solid.volume()
+        );
         assert!(out.distance_max < 0.37, "{}", out.distance_max);
-        assert_eq!((out.genus_before, out.genus_after, out.changes.len()), (0, 0, 0));
+        assert_eq!(
+            (out.genus_before, out.genus_after, out.changes.len()),
+            (0, 0, 0)
+        );
     }
 
     #[test]
@@ -305,13 +425,28 @@ mod tests {
         assert!(error.hint().is_some_and(|h| h.contains("flip")), "{error}");
         let mut sheet = cube(10.0);
         sheet.triangles.truncate(2);
-        assert!(matches!(remesh_at(&sheet, 0.5), Err(RemeshError::NotSolid { .. })));
-        assert_eq!(remesh_at(&TriMesh::default(), 0.5).err(), Some(RemeshError::Empty));
-        assert!(matches!(remesh_at(&cube(10.0), 1e-9), Err(RemeshError::TooManyVoxels { .. })));
-        assert!(matches!(remesh_at(&cube(10.0), f64::NAN), Err(RemeshError::BadOption { .. })));
+        assert!(matches!(
+            remesh_at(&sheet, 0.5),
+            Err(RemeshError::NotSolid { .. })
+        ));
+        assert_eq!(
+            remesh_at(&TriMesh::default(), 0.5).err(),
+            Some(RemeshError::Empty)
+        );
+        assert!(matches!(
+            remesh_at(&cube(10.0), 1e-9),
+            Err(RemeshError::TooManyVoxels { .. })
+        ));
+        assert!(matches!(
+            remesh_at(&cube(10.0), f64::NAN),
+            Err(RemeshError::BadOption { .. })
+        ));
         let monitor = Monitor::default();
         monitor.cancel();
-        assert!(matches!(remesh(&cube(1.0), &RemeshOptions::default(), &monitor), Err(RemeshError::Cancelled(_))));
+        assert!(matches!(
+            remesh(&cube(1.0), &RemeshOptions::default(), &monitor),
+            Err(RemeshError::Cancelled(_))
+        ));
     }
 
     /// A plate 20 x 20 x 3 with square holes, as density on a unit grid.
@@ -320,7 +455,9 @@ mod tests {
         for k in 2..5 {
             for j in 2..22 {
                 for i in 2..22 {
-                    let open = holes.iter().any(|&(x, y, n)| (x..x + n).contains(&i) && (y..y + n).contains(&j));
+                    let open = holes
+                        .iter()
+                        .any(|&(x, y, n)| (x..x + n).contains(&i) && (y..y + n).contains(&j));
                     let v = grid.index(i, j, k);
                     grid.values[v] = if open { 0.0 } else { 1.0 };
                 }
@@ -332,15 +469,32 @@ mod tests {
     #[test]
     fn pinholes_close_and_windows_stay() {
         let density = plate(&[(5, 5, 1), (12, 5, 2), (6, 12, 6)]);
-        let out = remesh_density(&density, 0.5, &RemeshOptions::default(), &Monitor::default()).expect("a plate");
+        let out = remesh_density(
+            &density,
+            0.5,
+            &RemeshOptions::default(),
+            &Monitor::default(),
+        )
+        .expect("a plate");
         assert_eq!((out.genus_before, out.genus_after), (3, 1));
         assert_eq!(out.changes.len(), 2);
-        assert!(out.changes.iter().all(|c| c.kind == ChangeKind::TunnelClosed && c.size < 3.0));
+        assert!(
+            out.changes
+                .iter()
+                .all(|c| c.kind == ChangeKind::TunnelClosed && c.size < 3.0)
+        );
         let first = &out.changes[0];
-        assert!((first.place - Vec3::new(12.5, 5.5, 3.0)).norm() < 0.7, "{first:?}");
+        assert!(
+            (first.place - Vec3::new(12.5, 5.5, 3.0)).norm() < 0.7,
+            "{first:?}"
+        );
         // The plug is as thick as the plate: no dent deeper than half a voxel of the source.
-        assert!(out.field.sample(&Vec3::new(12.5, 5.5, 3.0)) > 0.9);
-        let off = RemeshOptions { min_tunnel: 0.0, ..RemeshOptions::default() };
+        let depth = out.field.sample(&Vec3::new(12.5, 5.5, 3.0));
+        assert!(depth > 0.6, "{depth}");
+        let off = RemeshOptions {
+            min_tunnel: 0.0,
+            ..RemeshOptions::default()
+        };
         let out = remesh_density(&density, 0.5, &off, &Monitor::default()).expect("a plate");
         assert_eq!((out.genus_after, out.changes.len()), (3, 0));
     }
@@ -348,8 +502,15 @@ mod tests {
     #[test]
     fn a_kept_bore_stays() {
         let density = plate(&[(5, 5, 2), (14, 14, 2)]);
-        let bore = Capsule { a: Vec3::new(5.5, 5.5, 0.0), b: Vec3::new(5.5, 5.5, 6.0), radius: 2.0 };
-        let options = RemeshOptions { keep_open: vec![bore], ..RemeshOptions::default() };
+        let bore = Capsule {
+            a: Vec3::new(5.5, 5.5, 0.0),
+            b: Vec3::new(5.5, 5.5, 6.0),
+            radius: 2.0,
+        };
+        let options = RemeshOptions {
+            keep_open: vec![bore],
+            ..RemeshOptions::default()
+        };
         let out = remesh_density(&density, 0.5, &options, &Monitor::default()).expect("a plate");
         assert_eq!((out.genus_before, out.genus_after), (2, 1));
     }
@@ -358,7 +519,10 @@ mod tests {
     fn islands_cavities_and_short_bridges_go_and_struts_stay() {
         // Two blocks joined by a thick bar; beside it a thin short bridge.
         let mut grid = VoxelGrid::filled(Vec3::zeros(), 1.0, [30, 30, 16], 0f32);
-        let mut fill = |x: std::ops::Range<usize>, y: std::ops::Range<usize>, z: std::ops::Range<usize>, value: f32| {
+        let mut fill = |x: std::ops::Range<usize>,
+                        y: std::ops::Range<usize>,
+                        z: std::ops::Range<usize>,
+                        value: f32| {
             for k in z {
                 for j in y.clone() {
                     for i in x.clone() {
@@ -374,16 +538,27 @@ mod tests {
         fill(13..17, 24..25, 7..8, 1.0);
         fill(6..8, 15..17, 6..8, 0.0);
         fill(14..16, 27..29, 14..15, 1.0);
-        let out = remesh_density(&grid, 0.5, &RemeshOptions::default(), &Monitor::default()).expect("blocks");
-        let mut kinds: Vec<String> = out.changes.iter().map(|c| format!("{:?}", c.kind)).collect();
+        let out = remesh_density(&grid, 0.5, &RemeshOptions::default(), &Monitor::default())
+            .expect("blocks");
+        let mut kinds: Vec<String> = out
+            .changes
+            .iter()
+            .map(|c| format!("{:?}", c.kind))
+            .collect();
         kinds.sort();
-        assert_eq!((out.genus_before, out.genus_after), (1, 1), "{kinds:?}: a bridge longer than the limit stays");
+        assert_eq!(
+            (out.genus_before, out.genus_after),
+            (1, 1),
+            "{kinds:?}: a bridge longer than the limit stays"
+        );
         assert_eq!(kinds, ["CavityFilled", "IslandDropped"]);
     }
 
     #[test]
     fn densities_that_cannot_work_are_refused() {
-        let run = |grid: &VoxelGrid<f32>| remesh_density(grid, 0.5, &RemeshOptions::default(), &Monitor::default());
+        let run = |grid: &VoxelGrid<f32>| {
+            remesh_density(grid, 0.5, &RemeshOptions::default(), &Monitor::default())
+        };
         let mut grid = VoxelGrid::filled(Vec3::zeros(), 1.0, [8; 3], 0f32);
         assert!(matches!(run(&grid), Err(RemeshError::NoMaterial { .. })));
         grid.values.fill(f32::NAN);
@@ -402,8 +577,19 @@ mod tests {
     fn threads_do_not_change_a_bit() {
         let density = plate(&[(5, 5, 1), (6, 12, 6)]);
         let run = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| remesh_density(&density, 0.5, &RemeshOptions::default(), &Monitor::default())).expect("a plate")
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("a pool");
+            pool.install(|| {
+                remesh_density(
+                    &density,
+                    0.5,
+                    &RemeshOptions::default(),
+                    &Monitor::default(),
+                )
+            })
+            .expect("a plate")
         };
         let (one, two) = (run(1), run(2));
         assert_eq!(one.field, two.field);

@@ -5,7 +5,7 @@ use std::collections::{HashSet, VecDeque};
 use super::digital::{VoxelSet, delta_chi, is_simple};
 use super::options::Capsule;
 use super::patch::{Patch, Side, insert};
-use super::{ChangeKind, RemeshError, STAGE, TopologyChange};
+use super::{ChangeKind, RemeshError, STAGE, TopologyChange, signed_distance};
 use crate::Vec3;
 use crate::monitor::Monitor;
 use crate::topology::Betti;
@@ -13,8 +13,9 @@ use crate::voxel::VoxelGrid;
 
 /// Clean-up rounds at most; closing one tunnel can make a cavity small enough to be filled in the next round.
 const ROUNDS: usize = 4;
-/// Steps of the distance used to order voxels, per voxel.
-const STEPS: f32 = 16.0;
+/// Steps of the distance used to order voxels, per voxel. Coarse, so that along a tunnel of constant width the peel
+/// runs in from both mouths and the membrane ends up in the middle.
+const STEPS: f32 = 2.0;
 /// Cavities up to this many voxels are looked at when a plug closes one off.
 const CAVITY: usize = 1 << 20;
 
@@ -47,7 +48,11 @@ pub(super) fn remove_noise(
 ) -> Result<Outcome, RemeshError> {
     let mut set = VoxelSet::positive(grid.dims, &grid.values);
     let before = set.betti();
-    let mut out = Outcome { before, changes: Vec::new(), touched: vec![false; grid.values.len()] };
+    let mut out = Outcome {
+        before,
+        changes: Vec::new(),
+        touched: vec![false; grid.values.len()],
+    };
     if width <= 0.0 {
         return Ok(out);
     }
@@ -56,6 +61,10 @@ pub(super) fn remove_noise(
         monitor.step(STAGE, "topological noise", 0.6 + 0.05 * round as f64)?;
         let count = out.changes.len();
         drop_small(grid, &mut set, width, &kept, &mut out);
+        if out.changes.len() > count {
+            // Else the ghosts of the islands would be taken for gaps.
+            refresh(grid, &set, &out.touched, monitor)?;
+        }
         close_tunnels(grid, &mut set, width, &kept, &mut out, monitor)?;
         cut_bridges(grid, &mut set, width, &kept, &mut out, monitor)?;
         if out.changes.len() == count {
@@ -63,6 +72,33 @@ pub(super) fn remove_noise(
         }
     }
     Ok(out)
+}
+
+/// Distances around changes: values next to the surface and the untouched band are kept, the rest is swept anew.
+pub(super) fn refresh(
+    field: &mut VoxelGrid<f32>,
+    set: &VoxelSet,
+    touched: &[bool],
+    monitor: &Monitor,
+) -> Result<(), RemeshError> {
+    let band = ((signed_distance::BAND - 0.5) * field.spacing) as f32;
+    let steps = set.neighbours_26();
+    let at_surface = |v: usize| {
+        !set.on_border(v as u32)
+            && steps
+                .iter()
+                .any(|s| set.solid[(v as isize + s) as usize] != set.solid[v])
+    };
+    let known: Vec<bool> = (0..touched.len())
+        .map(|v| {
+            if touched[v] {
+                at_surface(v)
+            } else {
+                field.values[v].abs() <= band
+            }
+        })
+        .collect();
+    signed_distance::sweep(field, &known, monitor)
 }
 
 /// One flag a voxel: inside a capsule; empty when there are none.
@@ -96,10 +132,19 @@ fn is_kept(kept: &[bool], v: u32) -> bool {
     kept.get(v as usize).copied().unwrap_or(false)
 }
 
-fn drop_small(grid: &mut VoxelGrid<f32>, set: &mut VoxelSet, width: f64, kept: &[bool], out: &mut Outcome) {
+fn drop_small(
+    grid: &mut VoxelGrid<f32>,
+    set: &mut VoxelSet,
+    width: f64,
+    kept: &[bool],
+    out: &mut Outcome,
+) {
     let h = grid.spacing;
     let limit = (width / h).max(1.0);
-    for (solid, kind) in [(true, ChangeKind::IslandDropped), (false, ChangeKind::CavityFilled)] {
+    for (solid, kind) in [
+        (true, ChangeKind::IslandDropped),
+        (false, ChangeKind::CavityFilled),
+    ] {
         let all = set.components(solid, (limit.powi(3)).min(1e7) as usize + 1);
         for component in all {
             let small = component.extent() as f64 <= limit && !component.voxels.is_empty();
@@ -113,11 +158,19 @@ fn drop_small(grid: &mut VoxelGrid<f32>, set: &mut VoxelSet, width: f64, kept: &
                 let [i, j, k] = set.ijk(v);
                 sum += grid.centre(i, j, k);
                 set.solid[v as usize] = !solid;
-                grid.values[v as usize] = if solid { -0.5 * h as f32 } else { 0.5 * h as f32 };
+                grid.values[v as usize] = if solid {
+                    -0.5 * h as f32
+                } else {
+                    0.5 * h as f32
+                };
                 touch(grid, v, 4, &mut out.touched);
             }
             let place = sum / component.voxels.len() as f64;
-            out.changes.push(TopologyChange { kind, place, size: component.extent() as f64 * h });
+            out.changes.push(TopologyChange {
+                kind,
+                place,
+                size: component.extent() as f64 * h,
+            });
         }
     }
 }
@@ -143,7 +196,15 @@ fn close_tunnels(
     monitor: &Monitor,
 ) -> Result<(), RemeshError> {
     let mut plugs = Vec::new();
+    let six = set.neighbours_6();
     for voxels in residue(grid, set, Side::Solid, width / 2.0, kept, monitor)? {
+        // A piece on its own raises the Euler number too, but closes nothing.
+        if !voxels
+            .iter()
+            .any(|&v| six.iter().any(|s| set.solid[(v as isize + s) as usize]))
+        {
+            continue;
+        }
         let gain = flip_all(set, &voxels, true);
         if gain >= 1 {
             plugs.push(Patch::new(grid, voxels));
@@ -153,9 +214,21 @@ fn close_tunnels(
     }
     open_new_cavities(set, &mut plugs);
     for plug in &plugs {
-        out.changes.push(TopologyChange { kind: ChangeKind::TunnelClosed, place: plug.place, size: plug.width });
+        out.changes.push(TopologyChange {
+            kind: ChangeKind::TunnelClosed,
+            place: plug.place,
+            size: plug.width,
+        });
     }
-    insert(grid, set, Side::Solid, &mut plugs, width, kept, &mut out.touched);
+    insert(
+        grid,
+        set,
+        Side::Solid,
+        &mut plugs,
+        width,
+        kept,
+        &mut out.touched,
+    );
     Ok(())
 }
 
@@ -170,8 +243,17 @@ fn open_new_cavities(set: &mut VoxelSet, plugs: &mut Vec<Patch>) {
         let mut off = Vec::new();
         for mut cavity in set.components(false, CAVITY).into_iter().skip(1) {
             cavity.voxels.sort_unstable();
-            let within = |v: u32, s: &isize| cavity.voxels.binary_search(&((v as isize + s) as u32)).is_ok();
-            let touches = |plug: &Patch| plug.voxels.iter().any(|&v| steps.iter().any(|s| within(v, s)));
+            let within = |v: u32, s: &isize| {
+                cavity
+                    .voxels
+                    .binary_search(&((v as isize + s) as u32))
+                    .is_ok()
+            };
+            let touches = |plug: &Patch| {
+                plug.voxels
+                    .iter()
+                    .any(|&v| steps.iter().any(|s| within(v, s)))
+            };
             let widest = (0..plugs.len())
                 .filter(|&p| touches(&plugs[p]))
                 .max_by(|&a, &b| plugs[a].width.total_cmp(&plugs[b].width).then(b.cmp(&a)));
@@ -199,19 +281,36 @@ fn cut_bridges(
 ) -> Result<(), RemeshError> {
     let mut cuts = Vec::new();
     for voxels in residue(grid, set, Side::Empty, width / 2.0, kept, monitor)? {
-        let Some(length) = bridge_length(grid, set, &voxels, width) else { continue };
+        let Some(length) = bridge_length(grid, set, &voxels, width) else {
+            continue;
+        };
         let pieces = set.components(true, 0).len();
         let gain = flip_all(set, &voxels, false);
         if length <= width && gain >= 1 && set.components(true, 0).len() == pieces {
-            cuts.push(Patch { reach: (length / 2.0).max(grid.spacing), ..Patch::new(grid, voxels) });
+            cuts.push(Patch {
+                reach: (length / 2.0).max(grid.spacing),
+                ..Patch::new(grid, voxels)
+            });
         } else {
             flip_all(set, &voxels, true);
         }
     }
     for cut in &cuts {
-        out.changes.push(TopologyChange { kind: ChangeKind::BridgeCut, place: cut.place, size: cut.width });
+        out.changes.push(TopologyChange {
+            kind: ChangeKind::BridgeCut,
+            place: cut.place,
+            size: cut.width,
+        });
     }
-    insert(grid, set, Side::Empty, &mut cuts, width, kept, &mut out.touched);
+    insert(
+        grid,
+        set,
+        Side::Empty,
+        &mut cuts,
+        width,
+        kept,
+        &mut out.touched,
+    );
     Ok(())
 }
 
@@ -241,7 +340,10 @@ fn residue(
     let radius = radius as f32;
     let in_shell = |v: usize| {
         let depth = grid.values[v].abs();
-        set.solid[v] != growing && depth < radius && !is_kept(kept, v as u32) && !set.on_border(v as u32)
+        set.solid[v] != growing
+            && depth < radius
+            && !is_kept(kept, v as u32)
+            && !set.on_border(v as u32)
     };
     // `shell`: voxels of the grown set that are not peeled yet and not in the set itself.
     let mut shell: Vec<bool> = (0..set.solid.len()).map(in_shell).collect();
@@ -253,7 +355,11 @@ fn residue(
     let bucket = |v: u32| (grid.values[v as usize].abs() / h * STEPS) as usize;
     let mut queue = Queue::new((radius / h * STEPS) as usize + 1, set.solid.len());
     for v in 0..shell.len() as u32 {
-        if shell[v as usize] && steps.iter().any(|s| grown.solid[(v as isize + s) as usize] != growing) {
+        if shell[v as usize]
+            && steps
+                .iter()
+                .any(|s| grown.solid[(v as isize + s) as usize] != growing)
+        {
             queue.push(v, bucket(v));
         }
     }
@@ -316,7 +422,11 @@ struct Queue {
 
 impl Queue {
     fn new(buckets: usize, voxels: usize) -> Self {
-        Self { buckets: vec![VecDeque::new(); buckets + 1], queued: vec![false; voxels], top: 0 }
+        Self {
+            buckets: vec![VecDeque::new(); buckets + 1],
+            queued: vec![false; voxels],
+            top: 0,
+        }
     }
 
     fn push(&mut self, v: u32, bucket: usize) {
@@ -347,7 +457,11 @@ fn bridge_length(grid: &VoxelGrid<f32>, set: &VoxelSet, voxels: &[u32], width: f
         let [i, j, k] = set.ijk(v);
         grid.centre(i, j, k)
     };
-    if cut.width > width / 2.0 || voxels.iter().any(|&v| (at(v) - cut.place).norm() > width / 2.0) {
+    if cut.width > width / 2.0
+        || voxels
+            .iter()
+            .any(|&v| (at(v) - cut.place).norm() > width / 2.0)
+    {
         return None;
     }
     let six = set.neighbours_6();
@@ -371,7 +485,10 @@ fn bridge_length(grid: &VoxelGrid<f32>, set: &VoxelSet, voxels: &[u32], width: f
                 }
                 for s in &six {
                     let n = (v as isize + s) as u32;
-                    if set.solid[n as usize] && (at(n) - cut.place).norm() <= 2.0 * width && seen.insert(n) {
+                    if set.solid[n as usize]
+                        && (at(n) - cut.place).norm() <= 2.0 * width
+                        && seen.insert(n)
+                    {
                         side.push(n);
                     }
                 }

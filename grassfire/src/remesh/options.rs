@@ -24,7 +24,11 @@ impl Capsule {
     pub fn contains(&self, p: &Vec3) -> bool {
         let axis = self.b - self.a;
         let length2 = axis.norm_squared();
-        let t = if length2 > 0.0 { ((p - self.a).dot(&axis) / length2).clamp(0.0, 1.0) } else { 0.0 };
+        let t = if length2 > 0.0 {
+            ((p - self.a).dot(&axis) / length2).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
         (p - (self.a + axis * t)).norm_squared() <= self.radius * self.radius
     }
 }
@@ -51,6 +55,13 @@ pub struct RemeshOptions {
 
 impl Default for RemeshOptions {
     fn default() -> Self {
-        Self { voxel: None, min_tunnel: 3.0, keep_open: Vec::new(), smoothing: 0.7, max_voxels: 60_000_000, samples: 30_000 }
+        Self {
+            voxel: None,
+            min_tunnel: 3.0,
+            keep_open: Vec::new(),
+            smoothing: 0.7,
+            max_voxels: 60_000_000,
+            samples: 30_000,
+        }
     }
 }

@@ -40,7 +40,12 @@ impl Patch {
             sum += grid.centre(i, j, k);
             width = width.max(2.0 * grid.values[v as usize].abs());
         }
-        Self { place: sum / voxels.len().max(1) as f64, voxels, width: f64::from(width), reach: 0.0 }
+        Self {
+            place: sum / voxels.len().max(1) as f64,
+            voxels,
+            width: f64::from(width),
+            reach: 0.0,
+        }
     }
 }
 
@@ -70,14 +75,17 @@ pub(super) fn insert(
         if patch.reach <= 0.0 {
             patch.reach = wall(grid, set, patch, sign);
         }
-        patch.reach = patch.reach.clamp(h, (width / 3.0).max(h));
+        patch.reach = patch.reach.clamp(h, (width / 2.0).max(h));
         raise(grid, patch, &mut plate, &mut region);
     }
     region.retain(|&v| !set.on_border(v) && !kept.get(v as usize).copied().unwrap_or(false));
     region.sort_unstable();
     let mut values: Vec<f32> = {
         let rise = smooth_rise(grid, &plate, sign);
-        region.iter().map(|&v| sign * grid.values[v as usize] + rise(v)).collect()
+        region
+            .iter()
+            .map(|&v| sign * grid.values[v as usize] + rise(v))
+            .collect()
     };
     follow(set, side, &region, &values, &plate);
     let held = HELD * h as f32;
@@ -118,7 +126,8 @@ fn for_each_near(grid: &VoxelGrid<f32>, v: u32, reach: usize, mut visit: impl Fn
     for k in range(2) {
         for j in range(1) {
             for i in range(0) {
-                let d2 = i.abs_diff(at[0]).pow(2) + j.abs_diff(at[1]).pow(2) + k.abs_diff(at[2]).pow(2);
+                let d2 =
+                    i.abs_diff(at[0]).pow(2) + j.abs_diff(at[1]).pow(2) + k.abs_diff(at[2]).pow(2);
                 visit(grid.index(i, j, k), (d2 as f32).sqrt());
             }
         }
@@ -140,7 +149,11 @@ fn raise(grid: &VoxelGrid<f32>, patch: &Patch, plate: &mut [f32], region: &mut V
 }
 
 /// The Gauss-filtered amount by which the plate exceeds the field.
-fn smooth_rise<'a>(grid: &'a VoxelGrid<f32>, plate: &'a [f32], sign: f32) -> impl Fn(u32) -> f32 + 'a {
+fn smooth_rise<'a>(
+    grid: &'a VoxelGrid<f32>,
+    plate: &'a [f32],
+    sign: f32,
+) -> impl Fn(u32) -> f32 + 'a {
     let weights = weights(SIGMA);
     let radius = weights.len() / 2;
     move |v| {
@@ -161,8 +174,14 @@ fn smooth_rise<'a>(grid: &'a VoxelGrid<f32>, plate: &'a [f32], sign: f32) -> imp
 /// Flips voxels of `region` toward the sign of `values` wherever that is a simple point, nearest to the plate first.
 fn follow(set: &mut VoxelSet, side: Side, region: &[u32], values: &[f32], plate: &[f32]) {
     let member = |value: f32| (value > 0.0) == (side == Side::Solid);
-    let mut todo: Vec<usize> = (0..region.len()).filter(|&r| set.solid[region[r] as usize] != member(values[r])).collect();
-    todo.sort_by(|&a, &b| plate[region[b] as usize].total_cmp(&plate[region[a] as usize]).then(a.cmp(&b)));
+    let mut todo: Vec<usize> = (0..region.len())
+        .filter(|&r| set.solid[region[r] as usize] != member(values[r]))
+        .collect();
+    todo.sort_by(|&a, &b| {
+        plate[region[b] as usize]
+            .total_cmp(&plate[region[a] as usize])
+            .then(a.cmp(&b))
+    });
     for _ in 0..PASSES {
         let count = todo.len();
         todo.retain(|&r| {

@@ -12,19 +12,19 @@ use crate::mesh::distance::sample_surface;
 const MARGIN: usize = 4;
 /// Rays for the wall thickness.
 const RAYS: usize = 4000;
-/// Share of the walls that may be thinner than the thickness the voxel is chosen from.
-const THIN_SHARE: f64 = 0.1;
-/// Voxels across such a wall: wanted, and needed even when the grid becomes larger than wanted.
+/// Shares of the walls that may be thinner than the two thicknesses the voxel is chosen from.
+const THIN_SHARES: [f64; 2] = [0.1, 0.25];
+/// Voxels across such walls: wanted, and needed even when the grid becomes larger than wanted.
 const ACROSS: [f64; 2] = [6.0, 2.25];
 /// Voxels along the longest side of the box: at least, wanted at most, at most for the sake of thin walls.
 const LONGEST: [f64; 3] = [60.0, 200.0, 400.0];
 
 /// The voxel edge (mm) that is used when none is asked for.
 ///
-/// 1. `thickness`: 10th percentile of the wall thickness, from inward rays at 4000 points spread over the surface to
+/// 1. Thickness: 10th and 25th percentile of the wall thickness, from inward rays at 4000 points spread over the surface to
 ///    the opposite wall, where that is within 60 degrees of parallel.
-/// 2. `min(mean edge, thickness / 6)`, but no finer than 1/200 of the longest side of the box unless thinner walls
-///    would get fewer than 2.25 voxels, and then no finer than 1/400.
+/// 2. The smaller of the mean edge and 1/6 of the 10th percentile, but no finer than 1/200 of the longest side of the
+///    box unless walls of the 25th percentile would get fewer than 2.25 voxels, and then no finer than 1/400.
 /// 3. No coarser than 1/60 of the longest side; coarser again when `max_voxels` demands it.
 pub fn default_voxel(mesh: &TriMesh, options: &RemeshOptions) -> f64 {
     voxel_for(mesh, &Bvh::new(mesh), options)
@@ -33,9 +33,11 @@ pub fn default_voxel(mesh: &TriMesh, options: &RemeshOptions) -> f64 {
 pub(super) fn voxel_for(mesh: &TriMesh, bvh: &Bvh, options: &RemeshOptions) -> f64 {
     let (lo, hi) = bvh.bounds().unwrap_or_default();
     let longest = (hi - lo).max();
-    let thickness = wall_thickness(mesh, bvh).unwrap_or(f64::INFINITY);
-    let wanted = mean_edge(mesh).min(thickness / ACROSS[0]).max(longest / LONGEST[1]);
-    let needed = wanted.min(thickness / ACROSS[1]).max(longest / LONGEST[2]);
+    let [thin, common] = wall_thickness(mesh, bvh).unwrap_or([f64::INFINITY; 2]);
+    let wanted = mean_edge(mesh)
+        .min(thin / ACROSS[0])
+        .max(longest / LONGEST[1]);
+    let needed = wanted.min(common / ACROSS[1]).max(longest / LONGEST[2]);
     let mut voxel = needed.min(longest / LONGEST[0]);
     for _ in 0..64 {
         if voxel_count(&lo, &hi, voxel) <= options.max_voxels as f64 {
@@ -46,8 +48,8 @@ pub(super) fn voxel_for(mesh: &TriMesh, bvh: &Bvh, options: &RemeshOptions) -> f
     voxel
 }
 
-/// Low percentile of the wall thickness, mm; `None` when no ray meets an opposite wall.
-pub(super) fn wall_thickness(mesh: &TriMesh, bvh: &Bvh) -> Option<f64> {
+/// 10th and 25th percentile of the wall thickness, mm; `None` when no ray meets an opposite wall.
+fn wall_thickness(mesh: &TriMesh, bvh: &Bvh) -> Option<[f64; 2]> {
     let (lo, hi) = bvh.bounds()?;
     let diagonal = (hi - lo).norm();
     let normal = |t: u32| {
@@ -67,7 +69,7 @@ pub(super) fn wall_thickness(mesh: &TriMesh, bvh: &Bvh) -> Option<f64> {
         return None;
     }
     walls.sort_by(f64::total_cmp);
-    Some(walls[(walls.len() as f64 * THIN_SHARE) as usize])
+    Some(THIN_SHARES.map(|share| walls[(walls.len() as f64 * share) as usize]))
 }
 
 fn mean_edge(mesh: &TriMesh) -> f64 {
@@ -86,15 +88,28 @@ fn mean_edge(mesh: &TriMesh) -> f64 {
 }
 
 fn voxel_count(lo: &Vec3, hi: &Vec3, voxel: f64) -> f64 {
-    (hi - lo).iter().map(|side| (side / voxel).ceil() + 2.0 * MARGIN as f64 + 1.0).product()
+    (hi - lo)
+        .iter()
+        .map(|side| (side / voxel).ceil() + 2.0 * MARGIN as f64 + 1.0)
+        .product()
 }
 
 /// Origin and size of the grid, centred on the box so that a symmetric part gets a symmetric grid.
-pub(super) fn layout(lo: &Vec3, hi: &Vec3, voxel: f64, max_voxels: usize) -> Result<(Vec3, [usize; 3]), RemeshError> {
+pub(super) fn layout(
+    lo: &Vec3,
+    hi: &Vec3,
+    voxel: f64,
+    max_voxels: usize,
+) -> Result<(Vec3, [usize; 3]), RemeshError> {
     let wanted = voxel_count(lo, hi, voxel);
     if wanted.is_nan() || wanted > max_voxels as f64 || wanted > f64::from(u32::MAX) {
         let finest = (voxel * (wanted / max_voxels.max(1) as f64).cbrt() * 1.1).max(voxel);
-        return Err(RemeshError::TooManyVoxels { voxel, wanted, limit: max_voxels, finest });
+        return Err(RemeshError::TooManyVoxels {
+            voxel,
+            wanted,
+            limit: max_voxels,
+            finest,
+        });
     }
     let mut dims = [0; 3];
     let mut origin = Vec3::zeros();
@@ -120,15 +135,25 @@ pub(super) fn source_lattice(mesh: &TriMesh) -> Option<f64> {
     }
     let used: Vec<u32> = mesh.triangles.iter().map(|t| t[0]).collect();
     let step = (used.len() / 400).max(1);
-    let points: Vec<Vec3> = used.iter().step_by(step).map(|&v| mesh.points[v as usize] - lo).collect();
+    let points: Vec<Vec3> = used
+        .iter()
+        .step_by(step)
+        .map(|&v| mesh.points[v as usize] - lo)
+        .collect();
     let fit = |spacing: f64| {
         let mut on_plane = vec![0u8; points.len()];
         for axis in 0..3 {
-            let class = |p: &Vec3| ((p[axis] / spacing).rem_euclid(1.0) * CLASSES as f64) as usize % CLASSES;
+            let class = |p: &Vec3| {
+                ((p[axis] / spacing).rem_euclid(1.0) * CLASSES as f64) as usize % CLASSES
+            };
             let mut counts = [0usize; CLASSES];
             points.iter().for_each(|p| counts[class(p)] += 1);
-            let around = |c: usize| counts[c] + counts[(c + 1) % CLASSES] + counts[(c + CLASSES - 1) % CLASSES];
-            let best = (0..CLASSES).max_by_key(|&c| (around(c), counts[c], CLASSES - c)).unwrap_or(0);
+            let around = |c: usize| {
+                counts[c] + counts[(c + 1) % CLASSES] + counts[(c + CLASSES - 1) % CLASSES]
+            };
+            let best = (0..CLASSES)
+                .max_by_key(|&c| (around(c), counts[c], CLASSES - c))
+                .unwrap_or(0);
             for (p, n) in points.iter().zip(&mut on_plane) {
                 *n += u8::from((class(p) + CLASSES + 1 - best) % CLASSES <= 2);
             }
@@ -137,13 +162,20 @@ pub(super) fn source_lattice(mesh: &TriMesh) -> Option<f64> {
     };
     // A step moves the last lattice plane by 2 % of the spacing.
     let count = (0.8 * longest / (0.02 * edge)).ceil() as usize;
-    let spacings: Vec<f64> = (0..=count).map(|i| edge * (0.7 + 0.7 * i as f64 / count as f64)).collect();
+    let spacings: Vec<f64> = (0..=count)
+        .map(|i| edge * (0.7 + 0.7 * i as f64 / count as f64))
+        .collect();
     let fits: Vec<usize> = spacings.par_iter().map(|&s| fit(s)).collect();
     let best = fits.iter().copied().max()?;
     if best * 10 < points.len() * 9 {
         return None;
     }
-    let good: Vec<f64> = spacings.iter().zip(&fits).filter(|(_, f)| **f == best).map(|(s, _)| *s).collect();
+    let good: Vec<f64> = spacings
+        .iter()
+        .zip(&fits)
+        .filter(|(_, f)| **f == best)
+        .map(|(s, _)| *s)
+        .collect();
     Some(good[good.len() / 2])
 }
 
@@ -160,7 +192,10 @@ mod tests {
         plate.points.iter_mut().for_each(|p| p.z *= 0.01);
         let voxel = default_voxel(&plate, &RemeshOptions::default());
         assert!((voxel - 1.0 / 2.25).abs() < 1e-3, "{voxel}");
-        let few = RemeshOptions { max_voxels: 10_000, ..RemeshOptions::default() };
+        let few = RemeshOptions {
+            max_voxels: 10_000,
+            ..RemeshOptions::default()
+        };
         let voxel = default_voxel(&plate, &few);
         let (lo, hi) = plate.bounds().unwrap_or_default();
         assert!(layout(&lo, &hi, voxel, few.max_voxels).is_ok());
@@ -171,7 +206,8 @@ mod tests {
         let mut grid = crate::voxel::VoxelGrid::filled(Vec3::repeat(0.3), 1.5, [24; 3], 0f32);
         for v in 0..grid.values.len() {
             let [i, j, k] = grid.ijk(v);
-            grid.values[v] = 9.0 - (grid.centre(i, j, k) - Vec3::new(17.0, 17.3, 17.9)).norm() as f32;
+            grid.values[v] =
+                9.0 - (grid.centre(i, j, k) - Vec3::new(17.0, 17.3, 17.9)).norm() as f32;
         }
         let set = crate::remesh::digital::VoxelSet::positive(grid.dims, &grid.values);
         // Marching cubes puts its vertices on the lattice lines; move the dual vertices there.

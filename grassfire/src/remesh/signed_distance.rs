@@ -1,11 +1,10 @@
 //! Signed distance of a triangle soup on a voxel grid.
 
-use std::collections::HashMap;
-
 use rayon::prelude::*;
 
-use super::crossings::sign_by_rows;
-use super::{RemeshError, STAGE};
+use super::closing::caps;
+use super::crossings::winding_by_rows;
+use super::{PIECE, RemeshError, STAGE, split_long_edges};
 use crate::Vec3;
 use crate::mesh::TriMesh;
 use crate::mesh::bvh::Bvh;
@@ -17,15 +16,18 @@ use crate::voxel::VoxelGrid;
 pub(super) const BAND: f64 = 3.0;
 /// Winding number of the surface. A hair above one half, so that an open sheet (exactly 1/2 in its plane) is no solid.
 const INSIDE: f64 = 0.5 + 1e-4;
+/// Rows are counted when at most one open edge comes on this many triangles.
+const OPEN_SHARE: usize = 4;
 /// Edge of the blocks that get one sign where no surface is near, voxels.
 const BLOCK: usize = 4;
 
 /// Signed distance (mm, positive inside) of `mesh`; `bvh` holds the same surface.
 ///
 /// 1. Voxels within 3 voxels of a triangle get their exact distance from the tree.
-/// 2. Sign: winding number > 1/2. When the triangles close up exactly (every edge used as often forward as backward)
-///    it is counted along grid rows. Otherwise the generalized winding number is evaluated in the whole band, and
-///    beyond it for blocks of 4^3 voxels, subdivided where the sign is not clear.
+/// 2. Sign: winding number > 1/2. When few edges are open, caps close them; the winding number of the closed surface
+///    is an integer counted along grid rows, and the generalized winding number of the caps is taken off it. Otherwise
+///    the generalized winding number of everything is evaluated in the whole band, and beyond it for blocks of 4^3
+///    voxels, subdivided where the sign is not clear.
 /// 3. Beyond the band the distance is propagated by fast sweeping.
 pub(super) fn signed_distance(
     mesh: &TriMesh,
@@ -40,10 +42,9 @@ pub(super) fn signed_distance(
     mark_band(bvh, &mut grid);
     exact_distances(bvh, &mut grid);
     monitor.step(STAGE, "inside or outside", 0.3)?;
-    if closes_up(mesh) {
-        sign_by_rows(mesh, &mut grid);
-    } else {
-        sign_by_blocks(&Winding::new(bvh), &mut grid);
+    match caps(mesh, mesh.triangles.len() / OPEN_SHARE) {
+        Some(caps) => sign_by_rows(mesh, caps, &mut grid),
+        None => sign_by_blocks(&Winding::new(bvh), &mut grid),
     }
     monitor.step(STAGE, "far field", 0.5)?;
     let known: Vec<bool> = grid.values.par_iter().map(|v| v.is_finite()).collect();
@@ -59,9 +60,20 @@ fn mark_band(bvh: &Bvh, grid: &mut VoxelGrid<f32>) {
         while let Some((t, depth)) = stack.pop() {
             let (lo, hi) = (t[0].inf(&t[1]).inf(&t[2]), t[0].sup(&t[1]).sup(&t[2]));
             // A box around a large triangle would mark far more than the band: quarter it first.
-            if depth < 12 && (hi - lo).max() > 4.0 && (hi - lo).min() > 1.0 || depth < 12 && (hi - lo).max() > 16.0 {
-                let m = [(t[0] + t[1]) / 2.0, (t[1] + t[2]) / 2.0, (t[2] + t[0]) / 2.0];
-                for part in [[t[0], m[0], m[2]], [m[0], t[1], m[1]], [m[2], m[1], t[2]], m] {
+            if depth < 12 && (hi - lo).max() > 4.0 && (hi - lo).min() > 1.0
+                || depth < 12 && (hi - lo).max() > 16.0
+            {
+                let m = [
+                    (t[0] + t[1]) / 2.0,
+                    (t[1] + t[2]) / 2.0,
+                    (t[2] + t[0]) / 2.0,
+                ];
+                for part in [
+                    [t[0], m[0], m[2]],
+                    [m[0], t[1], m[1]],
+                    [m[2], m[1], t[2]],
+                    m,
+                ] {
                     stack.push((part, depth + 1));
                 }
                 continue;
@@ -78,7 +90,10 @@ fn mark_box(grid: &mut VoxelGrid<f32>, lo: &Vec3, hi: &Vec3) {
         if hi[a] < 0.0 || lo[a] > last {
             return;
         }
-        range[a] = [lo[a].ceil().clamp(0.0, last) as usize, hi[a].floor().clamp(0.0, last) as usize];
+        range[a] = [
+            lo[a].ceil().clamp(0.0, last) as usize,
+            hi[a].floor().clamp(0.0, last) as usize,
+        ];
     }
     for k in range[2][0]..=range[2][1] {
         for j in range[1][0]..=range[1][1] {
@@ -92,63 +107,68 @@ fn mark_box(grid: &mut VoxelGrid<f32>, lo: &Vec3, hi: &Vec3) {
 fn exact_distances(bvh: &Bvh, grid: &mut VoxelGrid<f32>) {
     let [nx, ny, _] = grid.dims;
     let (origin, h) = (grid.origin, grid.spacing);
-    grid.values.par_chunks_mut(nx).enumerate().for_each(|(row, values)| {
-        let (j, k) = (row % ny, row / ny);
-        let mut last = f64::INFINITY;
-        for (i, value) in values.iter_mut().enumerate() {
-            if *value != -1.0 {
-                last = f64::INFINITY;
-                continue;
+    grid.values
+        .par_chunks_mut(nx)
+        .enumerate()
+        .for_each(|(row, values)| {
+            let (j, k) = (row % ny, row / ny);
+            let mut last = f64::INFINITY;
+            for (i, value) in values.iter_mut().enumerate() {
+                if *value != -1.0 {
+                    last = f64::INFINITY;
+                    continue;
+                }
+                let p = origin + h * Vec3::new(i as f64, j as f64, k as f64);
+                // The distance changes by no more than one voxel from the voxel before.
+                let limit = (last + h * (1.0 + 1e-9)).min(BAND * h);
+                let found = bvh.nearest(&p, limit).map(|n| n.distance);
+                last = found.unwrap_or(f64::INFINITY);
+                *value = found.map_or(f32::INFINITY, |d| d as f32);
             }
-            let p = origin + h * Vec3::new(i as f64, j as f64, k as f64);
-            // The distance changes by no more than one voxel from the voxel before.
-            let limit = (last + h * (1.0 + 1e-9)).min(BAND * h);
-            let found = bvh.nearest(&p, limit).map(|n| n.distance);
-            last = found.unwrap_or(f64::INFINITY);
-            *value = found.map_or(f32::INFINITY, |d| d as f32);
-        }
-    });
+        });
 }
 
-/// Whether every directed edge has its opposite, so that the winding number is an integer off the surface.
-fn closes_up(mesh: &TriMesh) -> bool {
-    let mut ids: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.points.len());
-    let welded: Vec<u32> = mesh
-        .points
-        .iter()
-        .map(|p| {
-            // Adding zero makes -0.0 and 0.0 one point.
-            let next = ids.len() as u32;
-            *ids.entry([p.x, p.y, p.z].map(|x| (x + 0.0).to_bits())).or_insert(next)
-        })
-        .collect();
-    let mut edges: Vec<(u32, u32, i8)> = Vec::with_capacity(mesh.triangles.len() * 3);
-    for t in &mesh.triangles {
-        for k in 0..3 {
-            let (a, b) = (welded[t[k] as usize], welded[t[(k + 1) % 3] as usize]);
-            if a != b {
-                edges.push((a.min(b), a.max(b), if a < b { 1 } else { -1 }));
+/// Signs for a soup with few open edges, which `caps` close.
+fn sign_by_rows(mesh: &TriMesh, caps: TriMesh, grid: &mut VoxelGrid<f32>) {
+    let fine = split_long_edges(&caps, PIECE * grid.spacing);
+    let bvh = Bvh::new(&fine);
+    let winding = Winding::new(&bvh);
+    let mut closed = caps;
+    closed.triangles.extend(&mesh.triangles);
+    let numbers = winding_by_rows(&closed, grid);
+    let [nx, ny, _] = grid.dims;
+    let (origin, h) = (grid.origin, grid.spacing);
+    grid.values
+        .par_chunks_mut(nx)
+        .zip(numbers.par_chunks(nx))
+        .enumerate()
+        .for_each(|(row, (values, numbers))| {
+            for (i, (value, &number)) in values.iter_mut().zip(numbers).enumerate() {
+                let p = origin + h * Vec3::new(i as f64, (row % ny) as f64, (row / ny) as f64);
+                if f64::from(number) - winding.at(&p) <= INSIDE {
+                    *value = -*value;
+                }
             }
-        }
-    }
-    edges.par_sort_unstable();
-    edges.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)).all(|group| group.iter().map(|e| i64::from(e.2)).sum::<i64>() == 0)
+        });
 }
 
 /// Gives every voxel whose (unsigned) value satisfies `wanted` the sign of its winding number.
 fn sign_each(winding: &Winding, grid: &mut VoxelGrid<f32>, wanted: impl Fn(f32) -> bool + Sync) {
     let [nx, ny, _] = grid.dims;
     let (origin, h) = (grid.origin, grid.spacing);
-    grid.values.par_chunks_mut(nx).enumerate().for_each(|(row, values)| {
-        for (i, value) in values.iter_mut().enumerate() {
-            if wanted(*value) {
-                let p = origin + h * Vec3::new(i as f64, (row % ny) as f64, (row / ny) as f64);
-                if winding.at(&p) <= INSIDE {
-                    *value = -*value;
+    grid.values
+        .par_chunks_mut(nx)
+        .enumerate()
+        .for_each(|(row, values)| {
+            for (i, value) in values.iter_mut().enumerate() {
+                if wanted(*value) {
+                    let p = origin + h * Vec3::new(i as f64, (row % ny) as f64, (row / ny) as f64);
+                    if winding.at(&p) <= INSIDE {
+                        *value = -*value;
+                    }
                 }
             }
-        }
-    });
+        });
 }
 
 /// Signs for a soup with holes or unbalanced folds. Leaves the far voxels at +-infinity.
@@ -158,18 +178,29 @@ fn sign_by_blocks(winding: &Winding, grid: &mut VoxelGrid<f32>) {
     sign_each(winding, grid, f32::is_finite);
     let blocks = grid.dims.map(|n| n.div_ceil(BLOCK));
     let count = blocks[0] * blocks[1] * blocks[2];
-    let at = |i: usize, j: usize, k: usize| winding.at(&(origin + h * Vec3::new(i as f64, j as f64, k as f64)));
+    let at = |i: usize, j: usize, k: usize| {
+        winding.at(&(origin + h * Vec3::new(i as f64, j as f64, k as f64)))
+    };
     let values = &grid.values;
     let flips: Vec<Vec<u32>> = (0..count)
         .into_par_iter()
         .map(|b| {
-            let lo = [b % blocks[0], b / blocks[0] % blocks[1], b / (blocks[0] * blocks[1])].map(|x| x * BLOCK);
+            let lo = [
+                b % blocks[0],
+                b / blocks[0] % blocks[1],
+                b / (blocks[0] * blocks[1]),
+            ]
+            .map(|x| x * BLOCK);
             let hi = [0, 1, 2].map(|a| (lo[a] + BLOCK).min([nx, ny, nz][a]));
             let mut far = Vec::new();
             for k in lo[2]..hi[2] {
                 for j in lo[1]..hi[1] {
                     let row = (k * ny + j) * nx;
-                    far.extend((row + lo[0]..row + hi[0]).filter(|&v| values[v].is_infinite()).map(|v| v as u32));
+                    far.extend(
+                        (row + lo[0]..row + hi[0])
+                            .filter(|&v| values[v].is_infinite())
+                            .map(|v| v as u32),
+                    );
                 }
             }
             if far.is_empty() {
@@ -208,7 +239,11 @@ fn sign_by_blocks(winding: &Winding, grid: &mut VoxelGrid<f32>) {
 ///
 /// Fast sweeping, eight Gauss-Seidel sweeps in alternating directions (Zhao 2005, doi:10.1090/S0025-5718-04-01678-3).
 /// The sign of an unknown value says which side it is on; its size does not matter.
-pub(super) fn sweep(grid: &mut VoxelGrid<f32>, known: &[bool], monitor: &Monitor) -> Result<(), RemeshError> {
+pub(super) fn sweep(
+    grid: &mut VoxelGrid<f32>,
+    known: &[bool],
+    monitor: &Monitor,
+) -> Result<(), RemeshError> {
     let far = (grid.dims.iter().sum::<usize>() as f64 * grid.spacing) as f32;
     for (value, known) in grid.values.iter_mut().zip(known) {
         if !known {
@@ -228,11 +263,18 @@ pub(super) fn sweep(grid: &mut VoxelGrid<f32>, known: &[bool], monitor: &Monitor
                         continue;
                     }
                     let sign = 1f32.copysign(grid.values[v]);
-                    let value = |inside: bool, n: usize| if inside { sign * grid.values[n] } else { far };
+                    let value =
+                        |inside: bool, n: usize| if inside { sign * grid.values[n] } else { far };
                     // A neighbour across the surface counts as being on it.
-                    let x = value(i > 0, v.wrapping_sub(1)).min(value(i + 1 < nx, v + 1)).max(0.0);
-                    let y = value(j > 0, v.wrapping_sub(nx)).min(value(j + 1 < ny, v + nx)).max(0.0);
-                    let z = value(k > 0, v.wrapping_sub(nx * ny)).min(value(k + 1 < nz, v + nx * ny)).max(0.0);
+                    let x = value(i > 0, v.wrapping_sub(1))
+                        .min(value(i + 1 < nx, v + 1))
+                        .max(0.0);
+                    let y = value(j > 0, v.wrapping_sub(nx))
+                        .min(value(j + 1 < ny, v + nx))
+                        .max(0.0);
+                    let z = value(k > 0, v.wrapping_sub(nx * ny))
+                        .min(value(k + 1 < nz, v + nx * ny))
+                        .max(0.0);
                     let new = h * eikonal(x / h, y / h, z / h);
                     if new < grid.values[v].abs() {
                         grid.values[v] = new.copysign(sign);
@@ -284,26 +326,34 @@ mod tests {
     }
 
     #[test]
-    fn a_cube_closes_up_and_an_open_one_does_not() {
-        let mut cube = crate::remesh::tests::cube(2.0);
-        assert!(closes_up(&cube));
-        cube.triangles.pop();
-        assert!(!closes_up(&cube));
-    }
-
-    #[test]
-    fn both_sign_rules_agree_on_a_cube() {
+    fn all_sign_rules_agree_on_a_cube() {
         let cube = crate::remesh::tests::cube(8.0);
         let mut open = cube.clone();
-        open.triangles.push([0, 1, 2]);
         open.triangles.push([0, 2, 3]);
-        for mesh in [cube, open] {
+        let mut loose = TriMesh::default();
+        for t in 0..cube.triangles.len() {
+            // Every corner a hair off its neighbours': all edges are open.
+            let n = loose.points.len() as u32;
+            loose
+                .points
+                .extend(cube.corners(t).map(|p| p * (1.0 + 1e-9 * t as f64)));
+            loose.triangles.push([n, n + 1, n + 2]);
+        }
+        for mesh in [cube, open, loose] {
             let bvh = Bvh::new(&mesh);
-            let grid = signed_distance(&mesh, &bvh, Vec3::repeat(-5.7), 0.6, [20; 3], &Monitor::default()).expect("no cancel");
+            let grid = signed_distance(
+                &mesh,
+                &bvh,
+                Vec3::repeat(-5.7),
+                0.6,
+                [20; 3],
+                &Monitor::default(),
+            )
+            .expect("no cancel");
             for v in 0..grid.values.len() {
                 let [i, j, k] = grid.ijk(v);
                 let depth = 4.0 - grid.centre(i, j, k).abs().max();
-                assert!(depth.abs() < 1e-9 || (depth > 0.0) == (grid.values[v] > 0.0));
+                assert!(depth.abs() < 1e-6 || (depth > 0.0) == (grid.values[v] > 0.0));
             }
         }
     }
