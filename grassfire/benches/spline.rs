@@ -8,11 +8,15 @@ use std::time::Instant;
 use grassfire::Vec3;
 use grassfire::monitor::Monitor;
 use grassfire::spline::{
-    BrepOptions, ControlMesh, PatchOptions, TessellateOptions, build_brep, g1_max, patches, tessellate,
+    BrepOptions, ControlMesh, PatchOptions, TessellateOptions, build_brep, g1_max, patches,
+    tessellate,
 };
 
 fn main() {
-    println!("{:>8} {:>8} {:>9} {:>9} {:>9} {:>9}   relative cost per quad", "quads", "faces", "patches", "brep", "g1", "triangles");
+    println!(
+        "{:>8} {:>8} {:>9} {:>9} {:>9} {:>9}   relative cost per quad",
+        "quads", "faces", "patches", "brep", "g1", "triangles"
+    );
     let mut first = None;
     for cells in [12, 24, 48] {
         let mesh = gyroid(cells);
@@ -25,16 +29,27 @@ fn main() {
         };
         let patches = patches(&mesh, &PatchOptions::default(), &monitor).expect("a closed mesh");
         lap();
-        let brep = build_brep(&mesh, &patches, &BrepOptions::default(), &monitor).expect("a closed mesh");
+        let brep =
+            build_brep(&mesh, &patches, &BrepOptions::default(), &monitor).expect("a closed mesh");
         lap();
         g1_max(&mesh, &patches).expect("a closed mesh");
         lap();
-        let options = TessellateOptions { divisions: Some(4), ..TessellateOptions::default() };
+        let options = TessellateOptions {
+            divisions: Some(4),
+            ..TessellateOptions::default()
+        };
         tessellate(&mesh, &patches, &options).expect("a closed mesh");
         lap();
-        let cost: Vec<f64> = seconds.iter().map(|s| s / mesh.quads.len() as f64).collect();
+        let cost: Vec<f64> = seconds
+            .iter()
+            .map(|s| s / mesh.quads.len() as f64)
+            .collect();
         let base = first.get_or_insert_with(|| cost.clone());
-        let ratios: Vec<String> = cost.iter().zip(base).map(|(a, b)| format!("{:.2}", a / *b)).collect();
+        let ratios: Vec<String> = cost
+            .iter()
+            .zip(base)
+            .map(|(a, b)| format!("{:.2}", a / *b))
+            .collect();
         println!(
             "{:>8} {:>8} {:>9.4} {:>9.4} {:>9.4} {:>9.4}   {}",
             mesh.quads.len(),
@@ -53,7 +68,8 @@ fn main() {
 fn gyroid(cells: i32) -> ControlMesh {
     let inside = |p: [i32; 3]| {
         let [x, y, z] = p.map(|k| f64::from(k) * 0.7);
-        p.iter().all(|k| (0..cells).contains(k)) && x.sin() * y.cos() + y.sin() * z.cos() + z.sin() * x.cos() < 0.2
+        p.iter().all(|k| (0..cells).contains(k))
+            && x.sin() * y.cos() + y.sin() * z.cos() + z.sin() * x.cos() < 0.2
     };
     let mut filled: HashMap<[i32; 3], bool> = HashMap::new();
     let range = -1..=cells;
@@ -74,7 +90,9 @@ fn separate(filled: &mut HashMap<[i32; 3], bool>, cells: i32) -> bool {
     for i in 0..cells - 1 {
         for j in 0..cells - 1 {
             for k in 0..cells - 1 {
-                let corner: Vec<[i32; 3]> = (0..8).map(|b| [i + (b & 1), j + (b >> 1 & 1), k + (b >> 2)]).collect();
+                let corner: Vec<[i32; 3]> = (0..8)
+                    .map(|b| [i + (b & 1), j + (b >> 1 & 1), k + (b >> 2)])
+                    .collect();
                 let bits: Vec<bool> = corner.iter().map(|c| filled[c]).collect();
                 if !(connected(&bits, true) && connected(&bits, false)) {
                     corner.iter().for_each(|c| {
@@ -91,7 +109,9 @@ fn separate(filled: &mut HashMap<[i32; 3], bool>, cells: i32) -> bool {
 /// The cells of one kind around a point hang together by faces.
 fn connected(bits: &[bool], kind: bool) -> bool {
     let members: Vec<usize> = (0..8).filter(|b| bits[*b] == kind).collect();
-    let Some(&start) = members.first() else { return true };
+    let Some(&start) = members.first() else {
+        return true;
+    };
     let mut reached = vec![start];
     let mut done = 0;
     while done < reached.len() {
@@ -127,7 +147,8 @@ fn surface(filled: &HashMap<[i32; 3], bool>, cells: i32) -> ControlMesh {
                         p[(axis + 1) % 3] += b;
                         p[(axis + 2) % 3] += c;
                         *numbers.entry(p).or_insert_with(|| {
-                            mesh.points.push(Vec3::new(p[0].into(), p[1].into(), p[2].into()));
+                            mesh.points
+                                .push(Vec3::new(p[0].into(), p[1].into(), p[2].into()));
                             mesh.points.len() as u32 - 1
                         })
                     });

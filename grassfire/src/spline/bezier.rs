@@ -22,8 +22,16 @@ pub fn evaluate(patch: &Patch, u: f64, v: f64) -> SurfacePoint {
     let (su, sv) = (bernstein_slope(u), bernstein_slope(v));
     let du = blend(patch, &su, &bv);
     let dv = blend(patch, &bu, &sv);
-    let normal = du.cross(&dv).try_normalize(f64::MIN_POSITIVE).unwrap_or_default();
-    SurfacePoint { position: blend(patch, &bu, &bv), du, dv, normal }
+    let normal = du
+        .cross(&dv)
+        .try_normalize(f64::MIN_POSITIVE)
+        .unwrap_or_default();
+    SurfacePoint {
+        position: blend(patch, &bu, &bv),
+        du,
+        dv,
+        normal,
+    }
 }
 
 /// Basis polynomials and their derivatives at one parameter.
@@ -36,7 +44,11 @@ pub(super) fn basis(t: f64) -> Basis {
 
 /// Calls `visit(i, j, position, du, dv)` on the grid of all pairs of parameters given by their basis; cheaper than
 /// single points.
-pub(super) fn visit_grid(patch: &Patch, table: &[Basis], mut visit: impl FnMut(usize, usize, Vec3, Vec3, Vec3)) {
+pub(super) fn visit_grid(
+    patch: &Patch,
+    table: &[Basis],
+    mut visit: impl FnMut(usize, usize, Vec3, Vec3, Vec3),
+) {
     for (i, (value_u, slope_u)) in table.iter().enumerate() {
         let mut line = [Vec3::zeros(); 6];
         let mut line_du = [Vec3::zeros(); 6];
@@ -107,7 +119,13 @@ fn bernstein3(t: f64) -> [f64; 4] {
 /// Bernstein polynomials of one degree more.
 fn raise<const N: usize, const M: usize>(low: &[f64; N], t: f64) -> [f64; M] {
     let at = |i: usize| low.get(i).copied().unwrap_or(0.0);
-    std::array::from_fn(|i| if i == 0 { (1.0 - t) * at(0) } else { (1.0 - t) * at(i) + t * at(i - 1) })
+    std::array::from_fn(|i| {
+        if i == 0 {
+            (1.0 - t) * at(0)
+        } else {
+            (1.0 - t) * at(i) + t * at(i - 1)
+        }
+    })
 }
 
 fn differences<const N: usize, const M: usize>(low: &[f64; N]) -> [f64; M] {

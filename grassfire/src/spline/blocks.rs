@@ -62,7 +62,10 @@ impl Block {
             let mut high = self.spans;
             (low[axis], high[axis]) = (from, to);
             let cells = (low[0]..high[0]).flat_map(|i| (low[1]..high[1]).map(move |j| (i, j)));
-            Self { spans: [high[0] - low[0], high[1] - low[1]], cells: cells.map(|(i, j)| self.cell(i, j)).collect() }
+            Self {
+                spans: [high[0] - low[0], high[1] - low[1]],
+                cells: cells.map(|(i, j)| self.cell(i, j)).collect(),
+            }
         };
         [part(0, at), part(at, self.spans[axis])]
     }
@@ -70,9 +73,13 @@ impl Block {
     /// Half-edges along lattice line `at`.
     fn line(&self, axis: usize, at: u32) -> Vec<u32> {
         if axis == 0 {
-            (0..self.spans[1]).map(|j| self.cell(at, j).side(3)).collect()
+            (0..self.spans[1])
+                .map(|j| self.cell(at, j).side(3))
+                .collect()
         } else {
-            (0..self.spans[0]).map(|i| self.cell(i, at).side(0)).collect()
+            (0..self.spans[0])
+                .map(|i| self.cell(i, at).side(0))
+                .collect()
         }
     }
 }
@@ -80,7 +87,12 @@ impl Block {
 /// One block a quad; marks every half-edge.
 pub(super) fn single_quads(half_edges: &HalfEdges, cut: &mut [bool]) -> Vec<Block> {
     cut.fill(true);
-    (0..half_edges.len() / 4).map(|quad| Block { spans: [1, 1], cells: vec![Cell { quad, turn: 0 }] }).collect()
+    (0..half_edges.len() / 4)
+        .map(|quad| Block {
+            spans: [1, 1],
+            cells: vec![Cell { quad, turn: 0 }],
+        })
+        .collect()
 }
 
 /// Lays the quads between the cuts out as rectangles.
@@ -97,7 +109,12 @@ pub(super) fn rectangular_blocks(
     cut: &mut [bool],
 ) -> Result<Vec<Block>, SplineError> {
     let quads = mesh.quads.len();
-    let mut layout = Layout { half_edges, position: vec![[0; 2]; quads], turn: vec![0; quads], placed: vec![false; quads] };
+    let mut layout = Layout {
+        half_edges,
+        position: vec![[0; 2]; quads],
+        turn: vec![0; quads],
+        placed: vec![false; quads],
+    };
     let mut blocks = Vec::new();
     for seed in 0..quads as u32 {
         while !layout.placed[seed as usize] {
@@ -106,9 +123,13 @@ pub(super) fn rectangular_blocks(
                 blocks.push(block);
                 continue;
             }
-            let Some(across) = layout.cut_across(cut, &members) else { return Err(not_rectangular(mesh, seed)) };
+            let Some(across) = layout.cut_across(cut, &members) else {
+                return Err(not_rectangular(mesh, seed));
+            };
             across.iter().for_each(|&h| mark(half_edges, cut, h));
-            members.iter().for_each(|&q| layout.placed[q as usize] = false);
+            members
+                .iter()
+                .for_each(|&q| layout.placed[q as usize] = false);
         }
     }
     separate(mesh, half_edges, cut, blocks)
@@ -116,7 +137,10 @@ pub(super) fn rectangular_blocks(
 
 fn not_rectangular(mesh: &ControlMesh, quad: u32) -> SplineError {
     let corner = mesh.quads[quad as usize][0];
-    SplineError::NotRectangular { quad: quad as usize, place: mesh.points[corner as usize].into() }
+    SplineError::NotRectangular {
+        quad: quad as usize,
+        place: mesh.points[corner as usize].into(),
+    }
 }
 
 struct Layout<'a> {
@@ -185,19 +209,26 @@ impl Layout<'_> {
         let mut cells = vec![None; members.len()];
         for &quad in members {
             let [x, y] = [0, 1].map(|axis| self.position[quad as usize][axis].abs_diff(low[axis]));
-            let cell = Cell { quad, turn: self.turn[quad as usize] };
+            let cell = Cell {
+                quad,
+                turn: self.turn[quad as usize],
+            };
             if cells[(x * spans[1] + y) as usize].replace(cell).is_some() {
                 return None;
             }
             for h in 4 * quad..4 * quad + 4 {
                 let (other, position, turn) = self.neighbour(h);
-                let fits = self.position[other as usize] == position && self.turn[other as usize] == turn;
+                let fits =
+                    self.position[other as usize] == position && self.turn[other as usize] == turn;
                 if !cut[h as usize] && !fits {
                     return None;
                 }
             }
         }
-        Some(Block { spans, cells: cells.into_iter().collect::<Option<_>>()? })
+        Some(Block {
+            spans,
+            cells: cells.into_iter().collect::<Option<_>>()?,
+        })
     }
 
     /// The best straight line across a ring of quads: from a cut to a cut, through points that are ends already if
@@ -244,7 +275,10 @@ fn separate(
         let Some((axis, at)) = best_split(&block, half_edges, cut, &meetings) else {
             return Err(not_rectangular(mesh, block.cells[0].quad));
         };
-        block.line(axis, at).iter().for_each(|&h| mark(half_edges, cut, h));
+        block
+            .line(axis, at)
+            .iter()
+            .for_each(|&h| mark(half_edges, cut, h));
         let [first, second] = block.split(axis, at);
         waiting.push(second);
         waiting.push(first);
@@ -271,7 +305,12 @@ fn meetings(half_edges: &HalfEdges, block: &Block) -> Vec<[[u32; 2]; 2]> {
 }
 
 /// The lattice line that separates most meetings; among equals the one with fewest new end points, then the most central.
-fn best_split(block: &Block, half_edges: &HalfEdges, cut: &[bool], meetings: &[[[u32; 2]; 2]]) -> Option<(usize, u32)> {
+fn best_split(
+    block: &Block,
+    half_edges: &HalfEdges,
+    cut: &[bool],
+    meetings: &[[[u32; 2]; 2]],
+) -> Option<(usize, u32)> {
     let degree = |v: u32| half_edges.ring(v).filter(|&h| cut[h as usize]).count();
     let mut best = None;
     for axis in 0..2 {
@@ -288,7 +327,9 @@ fn best_split(block: &Block, half_edges: &HalfEdges, cut: &[bool], meetings: &[[
         for at in 1..length {
             separated += change[at as usize];
             let line = block.line(axis, at);
-            let (Some(&start), Some(&end)) = (line.first(), line.last()) else { continue };
+            let (Some(&start), Some(&end)) = (line.first(), line.last()) else {
+                continue;
+            };
             // Side 3 runs downward and side 0 to the right.
             let ends = if axis == 0 {
                 [half_edges.target(start), half_edges.origin[end as usize]]
@@ -314,14 +355,22 @@ mod tests {
     /// A grid of `m` x `n` quads closed in both directions, the second one with a shift.
     fn torus(m: u32, n: u32, shift: u32) -> ControlMesh {
         let at = |i: u32, j: u32| ((i + shift * (j / n)) % m) * n + j % n;
-        let points = (0..m * n).map(|k| Vec3::new(f64::from(k), 0.0, 0.0)).collect();
+        let points = (0..m * n)
+            .map(|k| Vec3::new(f64::from(k), 0.0, 0.0))
+            .collect();
         let quads = (0..m).flat_map(|i| (0..n).map(move |j| (i, j)));
         let quads = quads.map(|(i, j)| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
-        ControlMesh { points, quads: quads.collect() }
+        ControlMesh {
+            points,
+            quads: quads.collect(),
+        }
     }
 
     fn assert_simple(mesh: &ControlMesh, half_edges: &HalfEdges, blocks: &[Block]) {
-        let mut quads: Vec<u32> = blocks.iter().flat_map(|b| b.cells.iter().map(|c| c.quad)).collect();
+        let mut quads: Vec<u32> = blocks
+            .iter()
+            .flat_map(|b| b.cells.iter().map(|c| c.quad))
+            .collect();
         quads.sort_unstable();
         assert!(quads.into_iter().eq(0..mesh.quads.len() as u32));
         for block in blocks {
@@ -346,7 +395,11 @@ mod tests {
             let mut cut = cut_lines(&half_edges);
             let blocks = rectangular_blocks(&mesh, &half_edges, &mut cut).expect("rectangles");
             assert_simple(&mesh, &half_edges, &blocks);
-            assert!(shift != 0 || blocks.len() <= 4, "{} blocks on {m} x {n}", blocks.len());
+            assert!(
+                shift != 0 || blocks.len() <= 4,
+                "{} blocks on {m} x {n}",
+                blocks.len()
+            );
         }
     }
 
@@ -358,7 +411,9 @@ mod tests {
             let mut cut = vec![false; half_edges.twin.len()];
             for &at in &loops {
                 let start = (0..half_edges.len())
-                    .find(|&h| half_edges.origin[h as usize] == at && half_edges.target(h) == at + 6)
+                    .find(|&h| {
+                        half_edges.origin[h as usize] == at && half_edges.target(h) == at + 6
+                    })
                     .expect("an edge along the loop");
                 let mut h = start;
                 for _ in 0..8 {
@@ -368,7 +423,10 @@ mod tests {
             }
             let blocks = rectangular_blocks(&mesh, &half_edges, &mut cut).expect("rectangles");
             assert_simple(&mesh, &half_edges, &blocks);
-            assert_eq!(blocks.len(), if loops.len() == 1 { 4 } else { 2 * loops.len() });
+            assert_eq!(
+                blocks.len(),
+                if loops.len() == 1 { 4 } else { 2 * loops.len() }
+            );
         }
     }
 }

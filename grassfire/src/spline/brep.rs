@@ -54,7 +54,10 @@ pub fn build_brep(
 ) -> Result<Brep, SplineError> {
     let half_edges = HalfEdges::new(mesh)?;
     if patches.len() != mesh.quads.len() {
-        return Err(SplineError::PatchCount { patches: patches.len(), quads: mesh.quads.len() });
+        return Err(SplineError::PatchCount {
+            patches: patches.len(),
+            quads: mesh.quads.len(),
+        });
     }
     monitor.step(STAGE, "blocks", 0.0)?;
     let (blocks, cut) = match options.faces {
@@ -70,23 +73,52 @@ pub fn build_brep(
     monitor.step(STAGE, "faces", 0.3)?;
     let wires = wires(&half_edges, &cut, &blocks)?;
     let limit = smoothness_limit(mesh);
-    let nets: Vec<(Vec<Vec3>, f64)> = blocks.par_iter().map(|block| control_net(patches, block)).collect();
-    if let Some(k) = nets.iter().position(|(_, miss)| miss.is_nan() || *miss > limit) {
+    let nets: Vec<(Vec<Vec3>, f64)> = blocks
+        .par_iter()
+        .map(|block| control_net(patches, block))
+        .collect();
+    if let Some(k) = nets
+        .iter()
+        .position(|(_, miss)| miss.is_nan() || *miss > limit)
+    {
         let quad = blocks[k].cells[0].quad as usize;
         let place = mesh.points[mesh.quads[quad][0] as usize].into();
-        return Err(SplineError::NotSmooth { quad, place, value: nets[k].1, limit });
+        return Err(SplineError::NotSmooth {
+            quad,
+            place,
+            value: nets[k].1,
+            limit,
+        });
     }
     monitor.step(STAGE, "edges", 0.7)?;
     let faces: Vec<BrepFace> = blocks
         .iter()
         .zip(nets)
         .zip(wires.uses)
-        .map(|((block, (control, _)), uses)| BrepFace { spans: block.spans, control, uses })
+        .map(|((block, (control, _)), uses)| BrepFace {
+            spans: block.spans,
+            control,
+            uses,
+        })
         .collect();
-    let edges: Vec<BrepEdge> = wires.chains.par_iter().map(|chain| edge(&half_edges, patches, &wires.number, chain)).collect();
-    let vertices = wires.vertices.iter().map(|&v| corner(patches, half_edges.first[v as usize])).collect();
+    let edges: Vec<BrepEdge> = wires
+        .chains
+        .par_iter()
+        .map(|chain| edge(&half_edges, patches, &wires.number, chain))
+        .collect();
+    let vertices = wires
+        .vertices
+        .iter()
+        .map(|&v| corner(patches, half_edges.first[v as usize]))
+        .collect();
     let shells = shells(&faces, edges.len());
-    let brep = Brep { vertices, edges, faces, shells, volume: volume(patches) };
+    let brep = Brep {
+        vertices,
+        edges,
+        faces,
+        shells,
+        volume: volume(patches),
+    };
     check(&brep, half_edges.euler())?;
     monitor.step(STAGE, "boundary representation", 1.0)?;
     Ok(brep)
@@ -113,24 +145,39 @@ fn wires(half_edges: &HalfEdges, cut: &[bool], blocks: &[Block]) -> Result<Wires
     for (h, _) in cut.iter().enumerate().filter(|(_, c)| **c) {
         degree[half_edges.origin[h] as usize] += 1;
     }
-    let vertices: Vec<u32> =
-        (0..degree.len() as u32).filter(|&v| degree[v as usize] != 0 && degree[v as usize] != 2).collect();
+    let vertices: Vec<u32> = (0..degree.len() as u32)
+        .filter(|&v| degree[v as usize] != 0 && degree[v as usize] != 2)
+        .collect();
     let mut number = vec![u32::MAX; degree.len()];
-    vertices.iter().enumerate().for_each(|(k, &v)| number[v as usize] = k as u32);
+    vertices
+        .iter()
+        .enumerate()
+        .for_each(|(k, &v)| number[v as usize] = k as u32);
     // The edge that starts with each half-edge, and whether it runs against the first chain that was found.
     let mut known: Vec<Option<(u32, bool)>> = vec![None; half_edges.twin.len()];
-    let mut wires = Wires { vertices, number, chains: Vec::new(), uses: Vec::with_capacity(blocks.len()) };
+    let mut wires = Wires {
+        vertices,
+        number,
+        chains: Vec::new(),
+        uses: Vec::with_capacity(blocks.len()),
+    };
     for (index, block) in blocks.iter().enumerate() {
         let mut uses = Vec::new();
         for d in 0..4 {
             let side = block.side(d);
             let mut from = 0;
             while from < side.len() {
-                let is_vertex = |h: u32| wires.number[half_edges.origin[h as usize] as usize] != u32::MAX;
+                let is_vertex =
+                    |h: u32| wires.number[half_edges.origin[h as usize] as usize] != u32::MAX;
                 if !is_vertex(side[from]) {
-                    return Err(SplineError::Inconsistent { rule: "a block corner is a vertex", index });
+                    return Err(SplineError::Inconsistent {
+                        rule: "a block corner is a vertex",
+                        index,
+                    });
                 }
-                let to = (from + 1..side.len()).find(|&k| is_vertex(side[k])).unwrap_or(side.len());
+                let to = (from + 1..side.len())
+                    .find(|&k| is_vertex(side[k]))
+                    .unwrap_or(side.len());
                 let (first, last) = (side[from], side[to - 1]);
                 let (edge, reversed) = known[first as usize].unwrap_or_else(|| {
                     let edge = wires.chains.len() as u32;
@@ -141,7 +188,12 @@ fn wires(half_edges: &HalfEdges, cut: &[bool], blocks: &[Block]) -> Result<Wires
                 });
                 let [start, end] = [from, to].map(|t| block.parameters(d, t as u32).map(f64::from));
                 let (start, end) = if reversed { (end, start) } else { (start, end) };
-                uses.push(BrepUse { edge, reversed, start, end });
+                uses.push(BrepUse {
+                    edge,
+                    reversed,
+                    start,
+                    end,
+                });
                 from = to;
             }
         }
@@ -190,14 +242,16 @@ fn control_net(patches: &[Patch], block: &Block) -> (Vec<Vec3>, f64) {
     }
     let kept = (0..rows).filter(|&i| !is_joint(i, w)).flat_map(|i| {
         let net = &net;
-        (0..columns).filter(move |&j| !is_joint(j, h)).map(move |j| net[i * columns + j])
+        (0..columns)
+            .filter(move |&j| !is_joint(j, h))
+            .map(move |j| net[i * columns + j])
     });
     (kept.collect(), miss)
 }
 
 /// Control row `i` lies between two of `spans` Bezier spans and follows from its neighbours.
 fn is_joint(i: usize, spans: usize) -> bool {
-    i % 5 == 0 && i > 0 && i < 5 * spans
+    i.is_multiple_of(5) && i > 0 && i < 5 * spans
 }
 
 /// The Bezier points of half-edge `h`.
@@ -223,8 +277,15 @@ fn edge(half_edges: &HalfEdges, patches: &[Patch], number: &[u32], chain: &[u32]
         let to = if k + 1 < chain.len() { 5 } else { 6 };
         control.extend_from_slice(&row[from..to]);
     }
-    let ends = [half_edges.origin[chain[0] as usize], half_edges.target(chain[chain.len() - 1])];
-    BrepEdge { vertices: ends.map(|v| number[v as usize]), spans: chain.len() as u32, control }
+    let ends = [
+        half_edges.origin[chain[0] as usize],
+        half_edges.target(chain[chain.len() - 1]),
+    ];
+    BrepEdge {
+        vertices: ends.map(|v| number[v as usize]),
+        spans: chain.len() as u32,
+        control,
+    }
 }
 
 /// Faces of each connected component, ascending.
@@ -285,7 +346,10 @@ fn check(brep: &Brep, euler: i64) -> Result<(), SplineError> {
     }
     let value = brep.vertices.len() as i64 - brep.edges.len() as i64 + brep.faces.len() as i64;
     if value != euler {
-        return Err(SplineError::Euler { value, expected: euler });
+        return Err(SplineError::Euler {
+            value,
+            expected: euler,
+        });
     }
     Ok(())
 }
@@ -294,5 +358,9 @@ fn check(brep: &Brep, euler: i64) -> Result<(), SplineError> {
 fn directed(brep: &Brep, side: &BrepUse) -> ((u32, [f64; 2]), (u32, [f64; 2])) {
     let [a, b] = brep.edges[side.edge as usize].vertices;
     let (start, end) = ((a, side.start), (b, side.end));
-    if side.reversed { (end, start) } else { (start, end) }
+    if side.reversed {
+        (end, start)
+    } else {
+        (start, end)
+    }
 }

@@ -48,8 +48,14 @@ impl Constants {
         let ratio = (1.0 + cosine) / cosine;
         let curvature = 1.0 - 2.0 * eigenvalue;
         let bicubic_twist = -3.0 * cosine / (1.0 + cosine);
-        let twist = (bicubic_twist + weight * ratio * (curvature - 2.0)) / (1.0 + weight * ratio * ratio);
-        Self { cosine, edge_weight: scale * edge_weight, diagonal_weight: scale * diagonal_weight, twist }
+        let twist =
+            (bicubic_twist + weight * ratio * (curvature - 2.0)) / (1.0 + weight * ratio * ratio);
+        Self {
+            cosine,
+            edge_weight: scale * edge_weight,
+            diagonal_weight: scale * diagonal_weight,
+            twist,
+        }
     }
 }
 
@@ -65,19 +71,38 @@ struct Ring {
 }
 
 /// Computes the data of all points; see [`super::patches`] for the steps.
-pub(super) fn corner_data(mesh: &ControlMesh, half_edges: &HalfEdges, twist_weight: f64) -> CornerData {
+pub(super) fn corner_data(
+    mesh: &ControlMesh,
+    half_edges: &HalfEdges,
+    twist_weight: f64,
+) -> CornerData {
     let count = half_edges.len();
-    let face_points: Vec<Vec3> = (0..count).into_par_iter().map(|h| face_point(mesh, half_edges, h)).collect();
+    let face_points: Vec<Vec3> = (0..count)
+        .into_par_iter()
+        .map(|h| face_point(mesh, half_edges, h))
+        .collect();
     let edge_points: Vec<Vec3> = (0..count)
         .into_par_iter()
-        .map(|h| (face_points[h as usize] + face_points[next(half_edges.twin[h as usize]) as usize]) / 2.0)
+        .map(|h| {
+            (face_points[h as usize] + face_points[next(half_edges.twin[h as usize]) as usize])
+                / 2.0
+        })
         .collect();
     let largest = half_edges.valence.iter().copied().max().unwrap_or(0);
     let mut seen = vec![false; largest as usize + 1];
-    half_edges.valence.iter().for_each(|&n| seen[n as usize] = n != 4 && n > 0);
-    let constants: Vec<Option<Constants>> =
-        (0..=largest).map(|n| seen[n as usize].then(|| Constants::new(n, twist_weight))).collect();
-    let star = Star { mesh, half_edges, face_points: &face_points, edge_points: &edge_points };
+    half_edges
+        .valence
+        .iter()
+        .for_each(|&n| seen[n as usize] = n != 4 && n > 0);
+    let constants: Vec<Option<Constants>> = (0..=largest)
+        .map(|n| seen[n as usize].then(|| Constants::new(n, twist_weight)))
+        .collect();
+    let star = Star {
+        mesh,
+        half_edges,
+        face_points: &face_points,
+        edge_points: &edge_points,
+    };
     let rings: Vec<Option<Ring>> = (0..mesh.points.len() as u32)
         .into_par_iter()
         .map(|v| match half_edges.valence[v as usize] {
@@ -89,7 +114,12 @@ pub(super) fn corner_data(mesh: &ControlMesh, half_edges: &HalfEdges, twist_weig
         })
         .collect();
     let zeros = || vec![Vec3::zeros(); count as usize];
-    let mut data = CornerData { position: mesh.points.clone(), tangent: zeros(), twist: zeros(), bend: zeros() };
+    let mut data = CornerData {
+        position: mesh.points.clone(),
+        tangent: zeros(),
+        twist: zeros(),
+        bend: zeros(),
+    };
     for (v, ring) in rings.into_iter().enumerate() {
         let Some(ring) = ring else { continue };
         data.position[v] = ring.position;
@@ -119,7 +149,11 @@ struct Star<'a> {
 
 impl Star<'_> {
     fn position(&self, v: u32) -> Vec3 {
-        let sum: Vec3 = self.half_edges.ring(v).map(|h| self.face_points[h as usize]).sum();
+        let sum: Vec3 = self
+            .half_edges
+            .ring(v)
+            .map(|h| self.face_points[h as usize])
+            .sum();
         sum / f64::from(self.half_edges.valence[v as usize])
     }
 
@@ -132,7 +166,10 @@ impl Star<'_> {
             let twist = (position - edge - other + self.face_points[h as usize]) * 9.0;
             (h, [(edge - position) * 3.0, twist, Vec3::zeros()])
         });
-        Ring { position, edges: edges.collect() }
+        Ring {
+            position,
+            edges: edges.collect(),
+        }
     }
 
     /// Tangents in the limit tangent plane; twists and edge curvatures as the pull-back of one quadratic form, so that
@@ -143,12 +180,16 @@ impl Star<'_> {
         let n = ring.len();
         let step = 2.0 * PI / n as f64;
         let [x, y] = self.tangent_plane(v, &ring, constants);
-        let tangents: Vec<Vec3> =
-            (0..n).map(|i| x * (step * i as f64).cos() + y * (step * i as f64).sin()).collect();
+        let tangents: Vec<Vec3> = (0..n)
+            .map(|i| x * (step * i as f64).cos() + y * (step * i as f64).sin())
+            .collect();
         // Parts proportional to the tangents.
-        let twists: Vec<Vec3> = (0..n).map(|i| (tangents[i] + tangents[(i + 1) % n]) * constants.twist).collect();
-        let bends: Vec<Vec3> =
-            (0..n).map(|i| tangents[i] * self.edge_curvature(ring[i], constants)).collect();
+        let twists: Vec<Vec3> = (0..n)
+            .map(|i| (tangents[i] + tangents[(i + 1) % n]) * constants.twist)
+            .collect();
+        let bends: Vec<Vec3> = (0..n)
+            .map(|i| tangents[i] * self.edge_curvature(ring[i], constants))
+            .collect();
         // The quadratic form A (u.w) + B cos(a + b) + C sin(a + b) for directions of angle a and b: least squares against
         // the bicubic data. Its normal matrix is diagonal for every valence but 4.
         let mut form = [Vec3::zeros(); 3];
@@ -167,11 +208,15 @@ impl Star<'_> {
         form[2] /= n as f64;
         let edges = (0..n).map(|i| {
             let (a, b) = (angle_sum(i, 0), angle_sum(i, 1));
-            let twist = twists[i] + form[0] * constants.cosine + form[1] * b.cos() + form[2] * b.sin();
+            let twist =
+                twists[i] + form[0] * constants.cosine + form[1] * b.cos() + form[2] * b.sin();
             let bend = bends[i] + form[0] + form[1] * a.cos() + form[2] * a.sin();
             (ring[i], [tangents[i], twist, bend])
         });
-        Ring { position, edges: edges.collect() }
+        Ring {
+            position,
+            edges: edges.collect(),
+        }
     }
 
     /// Two vectors that span the limit tangent plane: the tangent of edge i is `x cos(2 pi i/n) + y sin(2 pi i/n)`.
@@ -182,7 +227,10 @@ impl Star<'_> {
         for (j, &h) in ring.iter().enumerate() {
             let quad = &self.mesh.quads[h as usize / 4];
             let corner = |k: u32| self.mesh.points[quad[((h + k) & 3) as usize] as usize] - centre;
-            let (edge, diagonal) = (corner(1) * constants.edge_weight, corner(2) * constants.diagonal_weight);
+            let (edge, diagonal) = (
+                corner(1) * constants.edge_weight,
+                corner(2) * constants.diagonal_weight,
+            );
             let (a, b) = (step * j as f64, step * (j as f64 + 0.5));
             plane[0] += edge * a.cos() + diagonal * b.cos();
             plane[1] += edge * a.sin() + diagonal * b.sin();
@@ -208,15 +256,24 @@ mod tests {
 
     #[test]
     fn constants_agree_with_the_published_prototype() {
-        for (n, scale, twist) in
-            [(3, 0.66779, 2.72774), (5, 1.11268, -0.52902), (6, 1.12840, -0.79552), (10, 0.96395, -1.14111)]
-        {
+        for (n, scale, twist) in [
+            (3, 0.66779, 2.72774),
+            (5, 1.11268, -0.52902),
+            (6, 1.12840, -0.79552),
+            (10, 0.96395, -1.14111),
+        ] {
             let constants = Constants::new(n, 0.3);
             let valence = f64::from(n);
             let half = (PI / valence).cos();
             let plain = (1.0 + half / (4.0 + half * half).sqrt()) / valence;
-            assert!((constants.edge_weight / plain - scale).abs() < 6e-6, "scale of valence {n}");
-            assert!((constants.twist - twist).abs() < 6e-6, "twist of valence {n}");
+            assert!(
+                (constants.edge_weight / plain - scale).abs() < 6e-6,
+                "scale of valence {n}"
+            );
+            assert!(
+                (constants.twist - twist).abs() < 6e-6,
+                "twist of valence {n}"
+            );
         }
     }
 }

@@ -71,7 +71,9 @@ pub enum SplineError {
         count: usize,
     },
     /// The quads around a point form more than one fan.
-    #[error("point {point} is pinched at {place:.3?}: its quads form more than one fan; {count} such points")]
+    #[error(
+        "point {point} is pinched at {place:.3?}: its quads form more than one fan; {count} such points"
+    )]
     PinchedPoint {
         /// Index of the point.
         point: u32,
@@ -81,7 +83,9 @@ pub enum SplineError {
         count: usize,
     },
     /// Too few quads around a point: there is no tangent plane.
-    #[error("point {point} has {valence} quads around it (3 or more wanted) at {place:.3?}; {count} such points")]
+    #[error(
+        "point {point} has {valence} quads around it (3 or more wanted) at {place:.3?}; {count} such points"
+    )]
     Valence {
         /// Index of the point.
         point: u32,
@@ -109,7 +113,9 @@ pub enum SplineError {
         place: [f64; 3],
     },
     /// Patches of one face do not join smoothly.
-    #[error("the patches of the face of quad {quad} at {place:.3?} miss a smooth joint by {value:.3e} mm (limit {limit:.3e})")]
+    #[error(
+        "the patches of the face of quad {quad} at {place:.3?} miss a smooth joint by {value:.3e} mm (limit {limit:.3e})"
+    )]
     NotSmooth {
         /// A quad of the face.
         quad: usize,
@@ -147,16 +153,23 @@ impl SplineError {
         let text = match self {
             Self::Empty => "the thickened body is empty: check the skeleton",
             Self::TooLarge { .. } => "use a larger quad size",
-            Self::MissingPoint { .. } | Self::NotFinite { .. } => "the control mesh file is damaged: write it again",
+            Self::MissingPoint { .. } | Self::NotFinite { .. } => {
+                "the control mesh file is damaged: write it again"
+            }
             Self::DegenerateQuad { .. } => "merge or remove the quad",
             Self::OpenEdge { .. } => "the control mesh must be closed: fill the hole",
-            Self::NonManifoldEdge { .. } => "orient all quads alike and separate walls that touch along an edge",
-            Self::PinchedPoint { .. } => "separate the parts that touch in this point",
-            Self::Valence { .. } => "merge the two quads around the point or split one of its neighbours",
-            Self::PatchCount { .. } => "compute the patches again from this control mesh",
-            Self::NotRectangular { .. } | Self::NotSmooth { .. } | Self::Inconsistent { .. } | Self::Euler { .. } => {
-                "build one face a quad: faces = \"quads\""
+            Self::NonManifoldEdge { .. } => {
+                "orient all quads alike and separate walls that touch along an edge"
             }
+            Self::PinchedPoint { .. } => "separate the parts that touch in this point",
+            Self::Valence { .. } => {
+                "merge the two quads around the point or split one of its neighbours"
+            }
+            Self::PatchCount { .. } => "compute the patches again from this control mesh",
+            Self::NotRectangular { .. }
+            | Self::NotSmooth { .. }
+            | Self::Inconsistent { .. }
+            | Self::Euler { .. } => "build one face a quad: faces = \"quads\"",
             Self::Cancelled(_) => return None,
         };
         Some(text.to_owned())

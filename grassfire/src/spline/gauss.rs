@@ -15,7 +15,10 @@ pub(super) static RULE: LazyLock<[(f64, f64); POINTS]> = LazyLock::new(|| {
             let (mut before, mut value) = (1.0, x);
             for m in 2..=POINTS {
                 let m = m as f64;
-                (before, value) = (value, ((2.0 * m - 1.0) * x * value - (m - 1.0) * before) / m);
+                (before, value) = (
+                    value,
+                    ((2.0 * m - 1.0) * x * value - (m - 1.0) * before) / m,
+                );
             }
             slope = n * (before - x * value) / (1.0 - x * x);
             x -= value / slope;
@@ -32,7 +35,10 @@ mod tests {
     fn integrates_degree_15_exactly() {
         for degree in 0..16 {
             let sum: f64 = RULE.iter().map(|(x, w)| w * x.powi(degree)).sum();
-            assert!((sum - 1.0 / (f64::from(degree) + 1.0)).abs() < 1e-15, "degree {degree}: {sum}");
+            assert!(
+                (sum - 1.0 / (f64::from(degree) + 1.0)).abs() < 1e-15,
+                "degree {degree}: {sum}"
+            );
         }
     }
 }

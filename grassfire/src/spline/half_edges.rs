@@ -86,7 +86,12 @@ impl HalfEdges {
             valence[v as usize] += 1;
             first[v as usize] = h as u32;
         }
-        let half_edges = Self { origin, twin, valence, first };
+        let half_edges = Self {
+            origin,
+            twin,
+            valence,
+            first,
+        };
         half_edges.check_points(mesh)?;
         Ok(half_edges)
     }
@@ -106,12 +111,21 @@ impl HalfEdges {
         };
         let bad: Vec<u32> = used().filter(pinched).collect();
         if let Some(&point) = bad.first() {
-            return Err(SplineError::PinchedPoint { point, place: mesh.points[point as usize].into(), count: bad.len() });
+            return Err(SplineError::PinchedPoint {
+                point,
+                place: mesh.points[point as usize].into(),
+                count: bad.len(),
+            });
         }
         let bad: Vec<u32> = used().filter(|&v| self.valence[v as usize] < 3).collect();
         if let Some(&point) = bad.first() {
             let place = mesh.points[point as usize].into();
-            return Err(SplineError::Valence { point, valence: self.valence[point as usize], place, count: bad.len() });
+            return Err(SplineError::Valence {
+                point,
+                valence: self.valence[point as usize],
+                place,
+                count: bad.len(),
+            });
         }
         Ok(())
     }
@@ -124,18 +138,33 @@ fn check_quads(mesh: &ControlMesh) -> Result<(), SplineError> {
         return Err(SplineError::Empty);
     }
     if mesh.quads.len() > LIMIT {
-        return Err(SplineError::TooLarge { quads: mesh.quads.len(), limit: LIMIT });
+        return Err(SplineError::TooLarge {
+            quads: mesh.quads.len(),
+            limit: LIMIT,
+        });
     }
-    if let Some(point) = mesh.points.iter().position(|p| !p.iter().all(|x| x.abs() <= LARGEST)) {
+    if let Some(point) = mesh
+        .points
+        .iter()
+        .position(|p| !p.iter().all(|x| x.abs() <= LARGEST))
+    {
         return Err(SplineError::NotFinite { point });
     }
     for (quad, corners) in mesh.quads.iter().enumerate() {
         for (k, &point) in corners.iter().enumerate() {
             if point as usize >= mesh.points.len() {
-                return Err(SplineError::MissingPoint { quad, point, points: mesh.points.len() });
+                return Err(SplineError::MissingPoint {
+                    quad,
+                    point,
+                    points: mesh.points.len(),
+                });
             }
             if corners[..k].contains(&point) {
-                return Err(SplineError::DegenerateQuad { quad, point, place: mesh.points[point as usize].into() });
+                return Err(SplineError::DegenerateQuad {
+                    quad,
+                    point,
+                    place: mesh.points[point as usize].into(),
+                });
             }
         }
     }
@@ -163,16 +192,29 @@ fn pair(mesh: &ControlMesh, origin: &[u32]) -> Result<Vec<u32>, SplineError> {
             _ => bad.push(group),
         }
     }
-    let Some(group) = bad.first() else { return Ok(twin) };
+    let Some(group) = bad.first() else {
+        return Ok(twin);
+    };
     let (edge, h) = group[0];
     let place = middle(mesh, edge).into();
     if group.len() == 1 {
         let count = bad.iter().filter(|g| g.len() == 1).count();
-        return Err(SplineError::OpenEdge { edge, quad: h as usize / 4, place, count });
+        return Err(SplineError::OpenEdge {
+            edge,
+            quad: h as usize / 4,
+            place,
+            count,
+        });
     }
     let along = group.iter().filter(|(_, h)| ends(*h) == edge).count();
     let count = bad.iter().filter(|g| g.len() > 1).count();
-    Err(SplineError::NonManifoldEdge { edge, along, against: group.len() - along, place, count })
+    Err(SplineError::NonManifoldEdge {
+        edge,
+        along,
+        against: group.len() - along,
+        place,
+        count,
+    })
 }
 
 fn middle(mesh: &ControlMesh, edge: [u32; 2]) -> Vec3 {
@@ -184,8 +226,17 @@ mod tests {
     use super::*;
 
     fn cube() -> ControlMesh {
-        let points = (0..8).map(|k| Vec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))).collect();
-        let quads = vec![[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let points = (0..8)
+            .map(|k| Vec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)))
+            .collect();
+        let quads = vec![
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
         ControlMesh { points, quads }
     }
 
@@ -201,7 +252,10 @@ mod tests {
         assert_eq!(half_edges.euler(), 2);
         for h in 0..half_edges.len() {
             assert_eq!(half_edges.twin[half_edges.twin[h as usize] as usize], h);
-            assert_eq!(half_edges.origin[half_edges.twin[h as usize] as usize], half_edges.target(h));
+            assert_eq!(
+                half_edges.origin[half_edges.twin[h as usize] as usize],
+                half_edges.target(h)
+            );
             assert_eq!(half_edges.ring(half_edges.origin[h as usize]).count(), 3);
         }
     }
@@ -211,7 +265,14 @@ mod tests {
         assert_eq!(error(&ControlMesh::default()), SplineError::Empty);
         let mut mesh = cube();
         mesh.quads[3][2] = 9;
-        assert_eq!(error(&mesh), SplineError::MissingPoint { quad: 3, point: 9, points: 8 });
+        assert_eq!(
+            error(&mesh),
+            SplineError::MissingPoint {
+                quad: 3,
+                point: 9,
+                points: 8
+            }
+        );
         for bad in [f64::NAN, f64::INFINITY, -1e200] {
             let mut mesh = cube();
             mesh.points[5].y = bad;
@@ -219,29 +280,78 @@ mod tests {
         }
         let mut mesh = cube();
         mesh.quads[2][1] = 0;
-        assert!(matches!(error(&mesh), SplineError::DegenerateQuad { quad: 2, point: 0, .. }));
+        assert!(matches!(
+            error(&mesh),
+            SplineError::DegenerateQuad {
+                quad: 2,
+                point: 0,
+                ..
+            }
+        ));
         let mut mesh = cube();
         mesh.quads.pop();
-        assert!(matches!(error(&mesh), SplineError::OpenEdge { edge: [1, 3], quad: 0, count: 4, .. }));
+        assert!(matches!(
+            error(&mesh),
+            SplineError::OpenEdge {
+                edge: [1, 3],
+                quad: 0,
+                count: 4,
+                ..
+            }
+        ));
         let mut mesh = cube();
         mesh.quads[0].reverse();
-        assert!(matches!(error(&mesh), SplineError::NonManifoldEdge { edge: [0, 1], count: 4, .. }));
+        assert!(matches!(
+            error(&mesh),
+            SplineError::NonManifoldEdge {
+                edge: [0, 1],
+                count: 4,
+                ..
+            }
+        ));
     }
 
     #[test]
     fn touching_cubes_are_pinched() {
         let (mut mesh, mut other) = (cube(), cube());
-        other.points.iter_mut().for_each(|p| *p += Vec3::new(1.0, 1.0, 1.0));
-        other.quads.iter_mut().flatten().for_each(|v| *v = if *v == 0 { 7 } else { *v + 8 });
+        other
+            .points
+            .iter_mut()
+            .for_each(|p| *p += Vec3::new(1.0, 1.0, 1.0));
+        other
+            .quads
+            .iter_mut()
+            .flatten()
+            .for_each(|v| *v = if *v == 0 { 7 } else { *v + 8 });
         mesh.points.append(&mut other.points);
         mesh.quads.append(&mut other.quads);
-        assert!(matches!(error(&mesh), SplineError::PinchedPoint { point: 7, count: 1, .. }));
+        assert!(matches!(
+            error(&mesh),
+            SplineError::PinchedPoint {
+                point: 7,
+                count: 1,
+                ..
+            }
+        ));
     }
 
     #[test]
     fn two_quads_around_a_point_are_refused() {
-        let points = (0..4).map(|k| Vec3::new(f64::from(k & 1), f64::from(k >> 1), 0.0)).collect();
-        let pillow = ControlMesh { points, quads: vec![[0, 1, 3, 2], [0, 2, 3, 1]] };
-        assert!(matches!(error(&pillow), SplineError::Valence { point: 0, valence: 2, count: 4, .. }));
+        let points = (0..4)
+            .map(|k| Vec3::new(f64::from(k & 1), f64::from(k >> 1), 0.0))
+            .collect();
+        let pillow = ControlMesh {
+            points,
+            quads: vec![[0, 1, 3, 2], [0, 2, 3, 1]],
+        };
+        assert!(matches!(
+            error(&pillow),
+            SplineError::Valence {
+                point: 0,
+                valence: 2,
+                count: 4,
+                ..
+            }
+        ));
     }
 }

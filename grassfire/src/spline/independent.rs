@@ -10,14 +10,20 @@ use std::collections::BTreeSet;
 ///
 /// `neighbours` are sorted lists, symmetric and without the node itself. Returns one flag a node.
 pub(super) fn independent_set(neighbours: &[Vec<u32>], cost: &[usize]) -> Vec<bool> {
-    let mut set = Set { neighbours, chosen: greedy(neighbours, cost), tight: vec![0; neighbours.len()] };
+    let mut set = Set {
+        neighbours,
+        chosen: greedy(neighbours, cost),
+        tight: vec![0; neighbours.len()],
+    };
     for (v, list) in neighbours.iter().enumerate() {
         set.tight[v] = list.iter().filter(|w| set.chosen[**w as usize]).count() as u32;
     }
     // Every replacement adds a node, so this ends; the first rounds bring nearly all of it.
     const ROUNDS: usize = 100;
     for _ in 0..ROUNDS {
-        let replaced = (0..neighbours.len() as u32).filter(|&v| set.improve(v)).count();
+        let replaced = (0..neighbours.len() as u32)
+            .filter(|&v| set.improve(v))
+            .count();
         if replaced == 0 {
             break;
         }
@@ -30,7 +36,8 @@ fn greedy(neighbours: &[Vec<u32>], cost: &[usize]) -> Vec<bool> {
     let mut degree: Vec<usize> = neighbours.iter().map(Vec::len).collect();
     let mut alive = vec![true; n];
     let mut chosen = vec![false; n];
-    let mut queue: BTreeSet<(usize, usize, u32)> = (0..n).map(|v| (degree[v], cost[v], v as u32)).collect();
+    let mut queue: BTreeSet<(usize, usize, u32)> =
+        (0..n).map(|v| (degree[v], cost[v], v as u32)).collect();
     while let Some((_, _, v)) = queue.pop_first() {
         chosen[v as usize] = true;
         alive[v as usize] = false;
@@ -76,11 +83,18 @@ impl Set<'_> {
         if !self.chosen[v as usize] {
             return false;
         }
-        let free: Vec<u32> =
-            self.neighbours[v as usize].iter().copied().filter(|w| self.tight[*w as usize] == 1).take(CANDIDATES).collect();
+        let free: Vec<u32> = self.neighbours[v as usize]
+            .iter()
+            .copied()
+            .filter(|w| self.tight[*w as usize] == 1)
+            .take(CANDIDATES)
+            .collect();
         for (i, &a) in free.iter().enumerate() {
             let list = &self.neighbours[a as usize];
-            if let Some(&b) = free[i + 1..].iter().find(|b| list.binary_search(b).is_err()) {
+            if let Some(&b) = free[i + 1..]
+                .iter()
+                .find(|b| list.binary_search(b).is_err())
+            {
                 self.flip(v, false);
                 self.flip(a, true);
                 self.flip(b, true);
@@ -113,21 +127,34 @@ mod tests {
     #[test]
     fn finds_the_leaves_of_a_star_and_half_of_a_ring() {
         let star = graph(5, &[[0, 1], [0, 2], [0, 3], [0, 4]]);
-        assert_eq!(independent_set(&star, &[1; 5]), [false, true, true, true, true]);
+        assert_eq!(
+            independent_set(&star, &[1; 5]),
+            [false, true, true, true, true]
+        );
         let ring = graph(6, &[[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [5, 0]]);
-        assert_eq!(independent_set(&ring, &[1; 6]).iter().filter(|x| **x).count(), 3);
+        assert_eq!(
+            independent_set(&ring, &[1; 6])
+                .iter()
+                .filter(|x| **x)
+                .count(),
+            3
+        );
     }
 
     #[test]
     fn is_independent_and_maximal_on_scrambled_graphs() {
         let mut state = 7u64;
         let mut random = |n: u64| {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
             ((state >> 33) % n) as u32
         };
         for n in [10u64, 60, 200] {
-            let mut edges: Vec<[u32; 2]> =
-                (0..2 * n).map(|_| [random(n), random(n)]).filter(|[a, b]| a < b).collect();
+            let mut edges: Vec<[u32; 2]> = (0..2 * n)
+                .map(|_| [random(n), random(n)])
+                .filter(|[a, b]| a < b)
+                .collect();
             edges.sort_unstable();
             edges.dedup();
             let lists = graph(n as usize, &edges);

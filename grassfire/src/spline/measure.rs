@@ -12,7 +12,9 @@ use crate::Vec3;
 /// direction, for which 8 Gauss points a direction are exact. Positions are taken about the first control point to keep
 /// precision; the sum runs in the order of the patches, so that the result does not depend on the number of threads.
 pub fn volume(patches: &[Patch]) -> f64 {
-    let Some(first) = patches.first() else { return 0.0 };
+    let Some(first) = patches.first() else {
+        return 0.0;
+    };
     let base = first.control[0][0];
     integrate(patches, |x, du, dv| (x - base).dot(&du.cross(&dv))) / 3.0
 }

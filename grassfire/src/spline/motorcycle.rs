@@ -33,7 +33,11 @@ pub(super) fn mark(half_edges: &HalfEdges, cut: &mut [bool], h: u32) {
 
 /// Points where lines end: all extraordinary ones, and one of every component that has none.
 fn line_ends(half_edges: &HalfEdges) -> Vec<bool> {
-    let mut ends: Vec<bool> = half_edges.valence.iter().map(|n| *n != 0 && *n != 4).collect();
+    let mut ends: Vec<bool> = half_edges
+        .valence
+        .iter()
+        .map(|n| *n != 0 && *n != 4)
+        .collect();
     let quads = half_edges.twin.len() / 4;
     let mut seen = vec![false; quads];
     for start in 0..quads {
@@ -82,16 +86,32 @@ fn chosen_lines(half_edges: &HalfEdges, ends: &[bool]) -> Vec<Vec<u32>> {
         lines.push(line);
     }
     let (neighbours, crosses_itself) = crossings(half_edges, &lines);
-    let usable: Vec<u32> = (0..lines.len() as u32).filter(|&i| !crosses_itself[i as usize]).collect();
+    let usable: Vec<u32> = (0..lines.len() as u32)
+        .filter(|&i| !crosses_itself[i as usize])
+        .collect();
     let mut number = vec![u32::MAX; lines.len()];
-    usable.iter().enumerate().for_each(|(k, &i)| number[i as usize] = k as u32);
+    usable
+        .iter()
+        .enumerate()
+        .for_each(|(k, &i)| number[i as usize] = k as u32);
     let compact: Vec<Vec<u32>> = usable
         .iter()
-        .map(|&i| neighbours[i as usize].iter().map(|&j| number[j as usize]).filter(|&k| k != u32::MAX).collect())
+        .map(|&i| {
+            neighbours[i as usize]
+                .iter()
+                .map(|&j| number[j as usize])
+                .filter(|&k| k != u32::MAX)
+                .collect()
+        })
         .collect();
     let cost: Vec<usize> = usable.iter().map(|&i| lines[i as usize].len()).collect();
     let chosen = independent_set(&compact, &cost);
-    usable.iter().zip(chosen).filter(|(_, c)| *c).map(|(&i, _)| std::mem::take(&mut lines[i as usize])).collect()
+    usable
+        .iter()
+        .zip(chosen)
+        .filter(|(_, c)| *c)
+        .map(|(&i, _)| std::mem::take(&mut lines[i as usize]))
+        .collect()
 }
 
 /// Lines that cross each line, sorted, and whether it crosses itself.
@@ -101,7 +121,10 @@ fn crossings(half_edges: &HalfEdges, lines: &[Vec<u32>]) -> (Vec<Vec<u32>>, Vec<
     let mut crosses_itself = vec![false; lines.len()];
     for (i, line) in lines.iter().enumerate() {
         for &h in &line[1..] {
-            let other = std::mem::replace(&mut through[half_edges.origin[h as usize] as usize], i as u32);
+            let other = std::mem::replace(
+                &mut through[half_edges.origin[h as usize] as usize],
+                i as u32,
+            );
             if other == i as u32 {
                 crosses_itself[i] = true;
             } else if other != u32::MAX {

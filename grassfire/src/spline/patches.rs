@@ -26,7 +26,10 @@ pub struct PatchOptions {
 
 impl Default for PatchOptions {
     fn default() -> Self {
-        Self { curvature_weight: 0.3, fold_limit: 0.05 }
+        Self {
+            curvature_weight: 0.3,
+            fold_limit: 0.05,
+        }
     }
 }
 
@@ -54,15 +57,25 @@ impl Default for PatchOptions {
 ///
 /// # Limits
 /// Folds of the control mesh stay folds: they are reported as a warning.
-pub fn patches(mesh: &ControlMesh, options: &PatchOptions, monitor: &Monitor) -> Result<Vec<Patch>, SplineError> {
+pub fn patches(
+    mesh: &ControlMesh,
+    options: &PatchOptions,
+    monitor: &Monitor,
+) -> Result<Vec<Patch>, SplineError> {
     let half_edges = HalfEdges::new(mesh)?;
     monitor.step(STAGE, "corners", 0.0)?;
-    let weight = if options.curvature_weight.is_finite() { options.curvature_weight.max(0.0) } else { 0.3 };
+    let weight = if options.curvature_weight.is_finite() {
+        options.curvature_weight.max(0.0)
+    } else {
+        0.3
+    };
     let corners = corner_data(mesh, &half_edges, weight);
     monitor.step(STAGE, "patches", 0.3)?;
     let strips = strips(&half_edges, &corners);
-    let patches: Vec<Patch> =
-        (0..mesh.quads.len() as u32).into_par_iter().map(|q| patch(&half_edges, &corners, &strips, q)).collect();
+    let patches: Vec<Patch> = (0..mesh.quads.len() as u32)
+        .into_par_iter()
+        .map(|q| patch(&half_edges, &corners, &strips, q))
+        .collect();
     monitor.step(STAGE, "folds", 0.8)?;
     warn_of_folds(&patches, options.fold_limit, monitor);
     monitor.step(STAGE, "patches", 1.0)?;
@@ -71,8 +84,13 @@ pub fn patches(mesh: &ControlMesh, options: &PatchOptions, monitor: &Monitor) ->
 
 fn warn_of_folds(patches: &[Patch], limit: f64, monitor: &Monitor) {
     let all = jacobians(patches);
-    let worst = all.iter().enumerate().min_by(|a, b| a.1.value.total_cmp(&b.1.value));
-    let Some((quad, worst)) = worst.filter(|(_, worst)| worst.value < limit) else { return };
+    let worst = all
+        .iter()
+        .enumerate()
+        .min_by(|a, b| a.1.value.total_cmp(&b.1.value));
+    let Some((quad, worst)) = worst.filter(|(_, worst)| worst.value < limit) else {
+        return;
+    };
     let count = all.iter().filter(|jacobian| jacobian.value < limit).count();
     let (place, value) = (<[f64; 3]>::from(worst.place), worst.value);
     monitor.warn(
@@ -120,7 +138,16 @@ fn edge_strips(half_edges: &HalfEdges, corners: &CornerData, h: u32) -> [Strip; 
     let difference = raise_cubic([start, start + start_slope / 3.0, end - end_slope / 3.0, end]);
     let left = [0, 1].map(|i| boundary[i] + (shear[i] + difference[i]) / 10.0);
     let right = [1, 0].map(|i| boundary[i] + (shear[i] - difference[i]) / 10.0);
-    [Strip { boundary, second: left }, Strip { boundary: [boundary[1], boundary[0]], second: right }]
+    [
+        Strip {
+            boundary,
+            second: left,
+        },
+        Strip {
+            boundary: [boundary[1], boundary[0]],
+            second: right,
+        },
+    ]
 }
 
 /// Control points 2 and 3 of the edge curve b of `h` and of `alpha b'`, both of degree 5.
@@ -132,19 +159,28 @@ fn boundary(half_edges: &HalfEdges, corners: &CornerData, h: u32) -> ([Vec3; 2],
     let [bend_a, bend_b] = [h, g].map(|h| corners.bend[h as usize]);
     let [cos_a, cos_b] = [a, b].map(|v| edge_cosine(half_edges.valence[v as usize]));
     match (half_edges.is_regular(a), half_edges.is_regular(b)) {
-        (true, true) => (raise_cubic([p, p + s / 3.0, q + t / 3.0, q]), [Vec3::zeros(); 2]),
+        (true, true) => (
+            raise_cubic([p, p + s / 3.0, q + t / 3.0, q]),
+            [Vec3::zeros(); 2],
+        ),
         (false, true) => {
             let (first, third) = (p + s / 4.0, q + t / 4.0);
             let second = first * 2.0 - p + bend_a / 12.0;
             // alpha = 2 cos_a (1 - u)^2
-            let shear = [(third - second) * (2.4 * cos_a), (q - third) * (0.8 * cos_a)];
+            let shear = [
+                (third - second) * (2.4 * cos_a),
+                (q - third) * (0.8 * cos_a),
+            ];
             (raise_quartic([first, second, third]), shear)
         }
         (true, false) => {
             let (first, third) = (p + s / 4.0, q + t / 4.0);
             let second = third * 2.0 - q + bend_b / 12.0;
             // alpha = -2 cos_b u^2
-            let shear = [(first - p) * (-0.8 * cos_b), (second - first) * (-2.4 * cos_b)];
+            let shear = [
+                (first - p) * (-0.8 * cos_b),
+                (second - first) * (-2.4 * cos_b),
+            ];
             (raise_quartic([first, second, third]), shear)
         }
         (false, false) => {
@@ -156,14 +192,23 @@ fn boundary(half_edges: &HalfEdges, corners: &CornerData, h: u32) -> ([Vec3; 2],
             let product = |low: Vec3, high: Vec3, k: f64| {
                 high * (2.0 * cos_a * (5.0 - k) / 5.0) - low * (2.0 * cos_b * k / 5.0)
             };
-            ([second, third], [product(slope[0], slope[1], 2.0), product(slope[1], slope[2], 3.0)])
+            (
+                [second, third],
+                [
+                    product(slope[0], slope[1], 2.0),
+                    product(slope[1], slope[2], 3.0),
+                ],
+            )
         }
     }
 }
 
 /// Points 2 and 3 of a cubic raised to degree 5.
 fn raise_cubic([a, b, c, d]: [Vec3; 4]) -> [Vec3; 2] {
-    [(a + b * 6.0 + c * 3.0) / 10.0, (b * 3.0 + c * 6.0 + d) / 10.0]
+    [
+        (a + b * 6.0 + c * 3.0) / 10.0,
+        (b * 3.0 + c * 6.0 + d) / 10.0,
+    ]
 }
 
 /// Points 2 and 3 of a quartic, given by its inner points, raised to degree 5.
@@ -193,7 +238,11 @@ fn patch(half_edges: &HalfEdges, corners: &CornerData, strips: &[Strip], quad: u
         set(0, 0, position);
         set(1, 0, position + along / 5.0);
         set(0, 1, position + inward / 5.0);
-        set(1, 1, position + (along + inward) / 5.0 + corners.twist[h as usize] / 25.0);
+        set(
+            1,
+            1,
+            position + (along + inward) / 5.0 + corners.twist[h as usize] / 25.0,
+        );
         set(2, 0, strip.boundary[0]);
         set(3, 0, strip.boundary[1]);
         set(2, 1, strip.second[0]);
@@ -217,7 +266,11 @@ static INNER_WEIGHTS: LazyLock<[[f64; 36]; 4]> = LazyLock::new(|| {
                 let mut row = [0.0; 36];
                 for (m, x) in DIFFERENCE.iter().enumerate() {
                     let at = shift + m;
-                    row[if transposed { 6 * at + line } else { 6 * line + at }] = *x;
+                    row[if transposed {
+                        6 * at + line
+                    } else {
+                        6 * line + at
+                    }] = *x;
                 }
                 let inner = INNER.map(|[i, j]| std::mem::take(&mut row[6 * i + j]));
                 for a in 0..4 {

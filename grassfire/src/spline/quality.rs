@@ -30,7 +30,10 @@ const EDGE_SAMPLES: usize = 33;
 pub fn g1_max(mesh: &ControlMesh, patches: &[Patch]) -> Result<G1Report, SplineError> {
     let half_edges = HalfEdges::new(mesh)?;
     if patches.len() != mesh.quads.len() {
-        return Err(SplineError::PatchCount { patches: patches.len(), quads: mesh.quads.len() });
+        return Err(SplineError::PatchCount {
+            patches: patches.len(),
+            quads: mesh.quads.len(),
+        });
     }
     let edges: Vec<G1Report> = (0..half_edges.len())
         .into_par_iter()
@@ -60,7 +63,12 @@ pub(super) fn side_parameters(k: u32, t: f64) -> [f64; 2] {
 
 fn edge_report(patches: &[Patch], h: u32, g: u32) -> G1Report {
     let quads = [h / 4, g / 4];
-    let mut report = G1Report { max_angle_deg: -1.0, place: Vec3::zeros(), quads, max_gap: 0.0 };
+    let mut report = G1Report {
+        max_angle_deg: -1.0,
+        place: Vec3::zeros(),
+        quads,
+        max_gap: 0.0,
+    };
     for k in 0..EDGE_SAMPLES {
         let t = k as f64 / (EDGE_SAMPLES - 1) as f64;
         let at = |h: u32, t: f64| {
@@ -71,7 +79,11 @@ fn edge_report(patches: &[Patch], h: u32, g: u32) -> G1Report {
         let angle = if p.normal == Vec3::zeros() || q.normal == Vec3::zeros() {
             180.0
         } else {
-            p.normal.cross(&q.normal).norm().atan2(p.normal.dot(&q.normal)).to_degrees()
+            p.normal
+                .cross(&q.normal)
+                .norm()
+                .atan2(p.normal.dot(&q.normal))
+                .to_degrees()
         };
         if angle > report.max_angle_deg {
             report.max_angle_deg = angle;
@@ -98,18 +110,29 @@ const JACOBIAN_SAMPLES: usize = 9;
 
 /// The smallest normalised Jacobian of each patch on a 9 x 9 grid.
 pub fn jacobians(patches: &[Patch]) -> Vec<Jacobian> {
-    let table: [Basis; JACOBIAN_SAMPLES] = std::array::from_fn(|k| basis(k as f64 / (JACOBIAN_SAMPLES - 1) as f64));
-    patches.par_iter().map(|patch| smallest_jacobian(patch, &table)).collect()
+    let table: [Basis; JACOBIAN_SAMPLES] =
+        std::array::from_fn(|k| basis(k as f64 / (JACOBIAN_SAMPLES - 1) as f64));
+    patches
+        .par_iter()
+        .map(|patch| smallest_jacobian(patch, &table))
+        .collect()
 }
 
 fn smallest_jacobian(patch: &Patch, table: &[Basis; JACOBIAN_SAMPLES]) -> Jacobian {
-    let mut worst = Jacobian { value: f64::INFINITY, place: Vec3::zeros() };
+    let mut worst = Jacobian {
+        value: f64::INFINITY,
+        place: Vec3::zeros(),
+    };
     // Normals of the row before, the sample before comes from this row.
     let mut before = [Vec3::zeros(); JACOBIAN_SAMPLES];
     visit_grid(patch, table, |i, j, place, du, dv| {
         let lengths = du.norm() * dv.norm();
         let cross = du.cross(&dv);
-        let sine = if lengths > 0.0 { cross.norm() / lengths } else { 0.0 };
+        let sine = if lengths > 0.0 {
+            cross.norm() / lengths
+        } else {
+            0.0
+        };
         let normal = cross.try_normalize(f64::MIN_POSITIVE).unwrap_or_default();
         let mut value = sine;
         if i > 0 {

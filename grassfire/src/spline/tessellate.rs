@@ -27,7 +27,12 @@ pub struct TessellateOptions {
 
 impl Default for TessellateOptions {
     fn default() -> Self {
-        Self { chord: 0.02, divisions: None, max_divisions: 64, max_triangles: 4_000_000 }
+        Self {
+            chord: 0.02,
+            divisions: None,
+            max_divisions: 64,
+            max_triangles: 4_000_000,
+        }
     }
 }
 
@@ -78,7 +83,10 @@ pub fn tessellate(
 ) -> Result<Tessellation, SplineError> {
     let half_edges = HalfEdges::new(mesh)?;
     if patches.len() != mesh.quads.len() {
-        return Err(SplineError::PatchCount { patches: patches.len(), quads: mesh.quads.len() });
+        return Err(SplineError::PatchCount {
+            patches: patches.len(),
+            quads: mesh.quads.len(),
+        });
     }
     let (grid, limited) = Grid::new(&half_edges, needs(patches, options), options.max_triangles);
     let samples = grid.samples();
@@ -86,11 +94,25 @@ pub fn tessellate(
         .par_iter()
         .map(|s| evaluate(&patches[s.quad as usize], s.parameters[0], s.parameters[1]).position)
         .collect();
-    let faces: Vec<Vec<[u32; 3]>> =
-        (0..mesh.quads.len() as u32).into_par_iter().map(|q| grid.triangulate(q, &points)).collect();
-    let tags = faces.iter().enumerate().flat_map(|(q, list)| std::iter::repeat_n(q as u32, list.len())).collect();
+    let faces: Vec<Vec<[u32; 3]>> = (0..mesh.quads.len() as u32)
+        .into_par_iter()
+        .map(|q| grid.triangulate(q, &points))
+        .collect();
+    let tags = faces
+        .iter()
+        .enumerate()
+        .flat_map(|(q, list)| std::iter::repeat_n(q as u32, list.len()))
+        .collect();
     let triangles = faces.into_iter().flatten().collect();
-    Ok(Tessellation { mesh: TriMesh { points, triangles, tags }, samples, limited })
+    Ok(Tessellation {
+        mesh: TriMesh {
+            points,
+            triangles,
+            tags,
+        },
+        samples,
+        limited,
+    })
 }
 
 /// Parts along u and v that each patch needs.
@@ -98,7 +120,10 @@ fn needs(patches: &[Patch], options: &TessellateOptions) -> Vec<[u32; 2]> {
     let most = options.max_divisions.clamp(1, 1024);
     match options.divisions {
         Some(n) => vec![[n.clamp(1, most); 2]; patches.len()],
-        None => patches.par_iter().map(|patch| need(patch, options.chord, most)).collect(),
+        None => patches
+            .par_iter()
+            .map(|patch| need(patch, options.chord, most))
+            .collect(),
     }
 }
 
@@ -120,7 +145,13 @@ fn need(patch: &Patch, chord: f64, most: u32) -> [u32; 2] {
     [uu + uv, vv + uv].map(|bend| {
         let parts = (bend / (4.0 * chord)).sqrt().ceil();
         // Also for a chord that is zero or not a number.
-        if parts >= 1.0 && parts < f64::from(most) { parts as u32 } else if parts < 1.0 { 1 } else { most }
+        if parts >= 1.0 && parts < f64::from(most) {
+            parts as u32
+        } else if parts < 1.0 {
+            1
+        } else {
+            most
+        }
     })
 }
 
@@ -142,15 +173,27 @@ struct Grid<'a> {
 
 impl<'a> Grid<'a> {
     /// Numbers the points; halves the `needs` until there are few enough triangles, which it tells.
-    fn new(half_edges: &'a HalfEdges, mut needs: Vec<[u32; 2]>, max_triangles: usize) -> (Self, bool) {
+    fn new(
+        half_edges: &'a HalfEdges,
+        mut needs: Vec<[u32; 2]>,
+        max_triangles: usize,
+    ) -> (Self, bool) {
         const INDEX_LIMIT: usize = 1 << 30;
         let (mut parts, mut cells) = divide(half_edges, &needs);
-        let too_many =
-            |cells: &[[u32; 2]]| cells.iter().map(|[u, v]| 2 * *u as usize * *v as usize).sum::<usize>() > max_triangles.min(INDEX_LIMIT);
+        let too_many = |cells: &[[u32; 2]]| {
+            cells
+                .iter()
+                .map(|[u, v]| 2 * *u as usize * *v as usize)
+                .sum::<usize>()
+                > max_triangles.min(INDEX_LIMIT)
+        };
         let mut limited = false;
         while too_many(&cells) && needs.iter().flatten().any(|n| *n > 1) {
             limited = true;
-            needs.iter_mut().flatten().for_each(|n| *n = (*n / 2).max(1));
+            needs
+                .iter_mut()
+                .flatten()
+                .for_each(|n| *n = (*n / 2).max(1));
             (parts, cells) = divide(half_edges, &needs);
         }
         let mut count = 0;
@@ -159,21 +202,49 @@ impl<'a> Grid<'a> {
             count += n;
             first
         };
-        let corner = half_edges.valence.iter().map(|n| take(u32::from(*n > 0))).collect();
+        let corner = half_edges
+            .valence
+            .iter()
+            .map(|n| take(u32::from(*n > 0)))
+            .collect();
         let mut edge = vec![0; parts.len()];
         for h in 0..half_edges.len() {
             let g = half_edges.twin[h as usize];
-            edge[h as usize] = if h < g { take(parts[h as usize] - 1) } else { edge[g as usize] };
+            edge[h as usize] = if h < g {
+                take(parts[h as usize] - 1)
+            } else {
+                edge[g as usize]
+            };
         }
         let inner = cells.iter().map(|[u, v]| take((u - 1) * (v - 1))).collect();
-        (Self { half_edges, parts, cells, corner, edge, inner, count }, limited)
+        (
+            Self {
+                half_edges,
+                parts,
+                cells,
+                corner,
+                edge,
+                inner,
+                count,
+            },
+            limited,
+        )
     }
 
     /// Where every point lies.
     fn samples(&self) -> Vec<SurfaceSample> {
         let mut samples = Vec::with_capacity(self.count as usize);
-        let on_side = |h: u32, t: f64| SurfaceSample { quad: h / 4, parameters: side_parameters(h, t) };
-        samples.extend(self.half_edges.first.iter().filter(|h| **h != u32::MAX).map(|&h| on_side(h, 0.0)));
+        let on_side = |h: u32, t: f64| SurfaceSample {
+            quad: h / 4,
+            parameters: side_parameters(h, t),
+        };
+        samples.extend(
+            self.half_edges
+                .first
+                .iter()
+                .filter(|h| **h != u32::MAX)
+                .map(|&h| on_side(h, 0.0)),
+        );
         for h in 0..self.half_edges.len() {
             if h < self.half_edges.twin[h as usize] {
                 let n = self.parts[h as usize];
@@ -223,7 +294,13 @@ impl<'a> Grid<'a> {
             };
             fill([0, m], [0, n], at, points, &mut triangles);
         } else {
-            fill([1, m - 1], [1, n - 1], |i, j| self.inside(quad, i, j), points, &mut triangles);
+            fill(
+                [1, m - 1],
+                [1, n - 1],
+                |i, j| self.inside(quad, i, j),
+                points,
+                &mut triangles,
+            );
             for (k, parts) in parts.into_iter().enumerate() {
                 let h = 4 * quad + k as u32;
                 let outer: Vec<u32> = (0..=parts).map(|t| self.on_side(h, t)).collect();
@@ -243,10 +320,16 @@ impl<'a> Grid<'a> {
 /// Parts of each half-edge: the larger need of its two quads; and cells of each quad.
 fn divide(half_edges: &HalfEdges, needs: &[[u32; 2]]) -> (Vec<u32>, Vec<[u32; 2]>) {
     let need = |h: u32| needs[h as usize / 4][(h & 1) as usize];
-    let parts: Vec<u32> = (0..half_edges.len()).map(|h| need(h).max(need(half_edges.twin[h as usize]))).collect();
+    let parts: Vec<u32> = (0..half_edges.len())
+        .map(|h| need(h).max(need(half_edges.twin[h as usize])))
+        .collect();
     let cells = parts.chunks_exact(4).map(|side| {
         let [u, v] = [side[0].max(side[2]), side[1].max(side[3])];
-        if side[0] == side[2] && side[1] == side[3] { [u, v] } else { [u.max(2), v.max(2)] }
+        if side[0] == side[2] && side[1] == side[3] {
+            [u, v]
+        } else {
+            [u.max(2), v.max(2)]
+        }
     });
     let cells = cells.collect();
     (parts, cells)

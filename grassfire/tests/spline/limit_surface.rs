@@ -38,12 +38,19 @@ fn stars(mesh: &ControlMesh) -> Vec<Vec<[u32; 2]>> {
 /// One Catmull-Clark step; quad `4 q + k` is the part of quad `q` at its corner `k`.
 fn subdivide(mesh: &ControlMesh) -> ControlMesh {
     let p = |v: u32| mesh.points[v as usize];
-    let faces: Vec<Vec3> = mesh.quads.iter().map(|q| q.iter().map(|&v| p(v)).sum::<Vec3>() / 4.0).collect();
+    let faces: Vec<Vec3> = mesh
+        .quads
+        .iter()
+        .map(|q| q.iter().map(|&v| p(v)).sum::<Vec3>() / 4.0)
+        .collect();
     let mut edges: BTreeMap<[u32; 2], (u32, Vec3)> = BTreeMap::new();
     let key = |a: u32, b: u32| [a.min(b), a.max(b)];
     for (q, face) in mesh.quads.iter().zip(&faces) {
         for k in 0..4 {
-            edges.entry(key(q[k], q[(k + 1) % 4])).or_insert((0, Vec3::zeros())).1 += face;
+            edges
+                .entry(key(q[k], q[(k + 1) % 4]))
+                .or_insert((0, Vec3::zeros()))
+                .1 += face;
         }
     }
     let mut points: Vec<Vec3> = Vec::new();
@@ -65,7 +72,10 @@ fn subdivide(mesh: &ControlMesh) -> ControlMesh {
     let mut quads = Vec::new();
     for (f, q) in mesh.quads.iter().enumerate() {
         for k in 0..4 {
-            let (next, previous) = (edges[&key(q[k], q[(k + 1) % 4])].0, edges[&key(q[k], q[(k + 3) % 4])].0);
+            let (next, previous) = (
+                edges[&key(q[k], q[(k + 1) % 4])].0,
+                edges[&key(q[k], q[(k + 3) % 4])].0,
+            );
             quads.push([q[k], next, first_face + f as u32, previous]);
         }
     }
@@ -77,7 +87,11 @@ fn limits(mesh: &ControlMesh) -> Vec<[Vec3; 2]> {
     let p = |v: u32| mesh.points[v as usize];
     let limit = |(v, star): (usize, &Vec<[u32; 2]>)| {
         let n = star.len() as f64;
-        let (edges, diagonals) = star.iter().fold((Vec3::zeros(), Vec3::zeros()), |(e, d), s| (e + p(s[0]), d + p(s[1])));
+        let (edges, diagonals) = star
+            .iter()
+            .fold((Vec3::zeros(), Vec3::zeros()), |(e, d), s| {
+                (e + p(s[0]), d + p(s[1]))
+            });
         let position = (mesh.points[v] * n * n + edges * 4.0 + diagonals) / (n * (n + 5.0));
         let root = (4.0 + (PI / n).cos().powi(2)).sqrt();
         let mut tangents = [Vec3::zeros(); 2];
@@ -106,19 +120,35 @@ struct Deviation {
 fn deviation(mesh: &ControlMesh, patches: &[Patch], levels: u32) -> Deviation {
     let mut fine = mesh.clone();
     // Quad and parameters of the four corners of each fine quad.
-    let mut places: Vec<(usize, [[f64; 2]; 4])> =
-        (0..mesh.quads.len()).map(|q| (q, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])).collect();
+    let mut places: Vec<(usize, [[f64; 2]; 4])> = (0..mesh.quads.len())
+        .map(|q| (q, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]))
+        .collect();
     for _ in 0..levels {
         fine = subdivide(&fine);
         let mix = |a: [f64; 2], b: [f64; 2]| [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0];
         let split = |(q, c): &(usize, [[f64; 2]; 4])| {
             let (q, c) = (*q, *c);
-            (0..4).map(move |k| (q, [c[k], mix(c[k], c[(k + 1) % 4]), mix(c[0], c[2]), mix(c[k], c[(k + 3) % 4])]))
+            (0..4).map(move |k| {
+                (
+                    q,
+                    [
+                        c[k],
+                        mix(c[k], c[(k + 1) % 4]),
+                        mix(c[0], c[2]),
+                        mix(c[k], c[(k + 3) % 4]),
+                    ],
+                )
+            })
         };
         places = places.iter().flat_map(split).collect();
     }
     let limits = limits(&fine);
-    let mut result = Deviation { max: 0.0, rms: 0.0, angle: 0.0, jacobian: 1.0 };
+    let mut result = Deviation {
+        max: 0.0,
+        rms: 0.0,
+        angle: 0.0,
+        jacobian: 1.0,
+    };
     let size = shapes::diagonal(mesh);
     for (quad, (owner, corners)) in fine.quads.iter().zip(&places) {
         for (v, [u, w]) in quad.iter().zip(corners) {
@@ -127,7 +157,14 @@ fn deviation(mesh: &ControlMesh, patches: &[Patch], levels: u32) -> Deviation {
             let distance = (point.position - position).dot(&normal).abs() / size;
             result.max = result.max.max(distance);
             result.rms += distance * distance / (4 * places.len()) as f64;
-            result.angle = result.angle.max(point.normal.dot(&normal).clamp(-1.0, 1.0).acos().to_degrees());
+            result.angle = result.angle.max(
+                point
+                    .normal
+                    .dot(&normal)
+                    .clamp(-1.0, 1.0)
+                    .acos()
+                    .to_degrees(),
+            );
             let sine = point.du.cross(&point.dv).dot(&normal) / (point.du.norm() * point.dv.norm());
             result.jacobian = result.jacobian.min(sine);
         }
@@ -141,11 +178,23 @@ fn patches_are_close_to_the_limit_surface() {
     for (name, mut mesh) in shapes::all() {
         shapes::jitter(&mut mesh, 0.05, 6);
         let coarse = deviation(&mesh, &build(&mesh), 3);
-        println!("{name}: max {:.5} rms {:.5} angle {:.1} jacobian {:.2}", coarse.max, coarse.rms, coarse.angle, coarse.jacobian);
-        assert!(coarse.max < 0.009 && coarse.angle < 10.0 && coarse.jacobian > 0.6, "{name}");
+        println!(
+            "{name}: max {:.5} rms {:.5} angle {:.1} jacobian {:.2}",
+            coarse.max, coarse.rms, coarse.angle, coarse.jacobian
+        );
+        assert!(
+            coarse.max < 0.009 && coarse.angle < 10.0 && coarse.jacobian > 0.6,
+            "{name}"
+        );
         let once = subdivide(&mesh);
         let fine = deviation(&once, &build(&once), 2);
-        println!("   after one step: max {:.5} rms {:.5} angle {:.1} jacobian {:.2}", fine.max, fine.rms, fine.angle, fine.jacobian);
-        assert!(fine.max < 0.0009 && fine.rms < 0.0005 && fine.angle < 4.5 && fine.jacobian > 0.7, "{name}");
+        println!(
+            "   after one step: max {:.5} rms {:.5} angle {:.1} jacobian {:.2}",
+            fine.max, fine.rms, fine.angle, fine.jacobian
+        );
+        assert!(
+            fine.max < 0.0009 && fine.rms < 0.0005 && fine.angle < 4.5 && fine.jacobian > 0.7,
+            "{name}"
+        );
     }
 }

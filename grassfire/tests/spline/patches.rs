@@ -2,7 +2,10 @@
 
 use grassfire::Vec3;
 use grassfire::monitor::Monitor;
-use grassfire::spline::{ControlMesh, Patch, PatchOptions, area, evaluate, g1_max, jacobians, patches, volume};
+use grassfire::spline::{
+    BrepOptions, ControlMesh, Patch, PatchOptions, TessellateOptions, area, build_brep, evaluate,
+    g1_max, jacobians, patches, tessellate, volume,
+};
 use proptest::prelude::*;
 
 use crate::shapes;
@@ -12,7 +15,9 @@ pub fn build(mesh: &ControlMesh) -> Vec<Patch> {
 }
 
 fn smallest_jacobian(patches: &[Patch]) -> f64 {
-    jacobians(patches).iter().fold(f64::INFINITY, |least, j| least.min(j.value))
+    jacobians(patches)
+        .iter()
+        .fold(f64::INFINITY, |least, j| least.min(j.value))
 }
 
 fn assert_smooth(name: &str, mesh: &ControlMesh, patches: &[Patch]) {
@@ -20,8 +25,14 @@ fn assert_smooth(name: &str, mesh: &ControlMesh, patches: &[Patch]) {
     // The normal itself is only known to rounding over the sine between the derivatives.
     let smallest = smallest_jacobian(patches);
     let limit = if smallest > 1e-3 { 1e-6 } else { 1e-3 };
-    assert!(report.max_angle_deg <= limit, "{name}: {report:?}, {smallest}");
-    assert!(report.max_gap <= 1e-12 * shapes::diagonal(mesh), "{name}: {report:?}");
+    assert!(
+        report.max_angle_deg <= limit,
+        "{name}: {report:?}, {smallest}"
+    );
+    assert!(
+        report.max_gap <= 1e-12 * shapes::diagonal(mesh),
+        "{name}: {report:?}"
+    );
 }
 
 /// The control row of each side, from corner to corner.
@@ -40,7 +51,11 @@ fn assert_shared_rows(name: &str, mesh: &ControlMesh, patches: &[Patch]) {
     for ([a, b], row) in &rows {
         let mut other = rows[&[*b, *a]];
         other.reverse();
-        assert!(*row == other, "{name}: edge {a} {b} differs by {:?}", row[2] - other[2]);
+        assert!(
+            *row == other,
+            "{name}: edge {a} {b} differs by {:?}",
+            row[2] - other[2]
+        );
     }
 }
 
@@ -59,7 +74,10 @@ fn real_bodies_are_smooth_and_share_rows_exactly() {
         let patches = build(&mesh);
         assert_smooth(&name, &mesh, &patches);
         assert_shared_rows(&name, &mesh, &patches);
-        let folds = jacobians(&patches).iter().filter(|j| j.value < 0.05).count();
+        let folds = jacobians(&patches)
+            .iter()
+            .filter(|j| j.value < 0.05)
+            .count();
         println!(
             "{name}: {:?} folds {folds} smallest {} area {}",
             g1_max(&mesh, &patches),
@@ -77,9 +95,20 @@ fn regular_nets_give_the_bicubic_spline() {
     let patches = build(&mesh);
     let basis = |t: f64| {
         let s = 1.0 - t;
-        [s * s * s, 3.0 * t.powi(3) - 6.0 * t * t + 4.0, 3.0 * s.powi(3) - 6.0 * s * s + 4.0, t * t * t].map(|x| x / 6.0)
+        [
+            s * s * s,
+            3.0 * t.powi(3) - 6.0 * t * t + 4.0,
+            3.0 * s.powi(3) - 6.0 * s * s + 4.0,
+            t * t * t,
+        ]
+        .map(|x| x / 6.0)
     };
-    for (i, j, u, v) in [(0, 0, 0.3, 0.8), (4, 6, 0.5, 0.5), (9, 3, 0.0, 0.9), (2, 2, 1.0, 1.0)] {
+    for (i, j, u, v) in [
+        (0, 0, 0.3, 0.8),
+        (4, 6, 0.5, 0.5),
+        (9, 3, 0.0, 0.9),
+        (2, 2, 1.0, 1.0),
+    ] {
         let mut expected = Vec3::zeros();
         for (a, x) in basis(u).into_iter().enumerate() {
             for (b, y) in basis(v).into_iter().enumerate() {
@@ -111,7 +140,9 @@ fn volume_and_area_follow_motion_and_scale() {
     shapes::jitter(&mut mesh, 0.1, 2);
     let before = (volume(&build(&mesh)), area(&build(&mesh)));
     let turn = nalgebra::Rotation3::from_euler_angles(0.4, 1.1, -0.3);
-    mesh.points.iter_mut().for_each(|p| *p = turn * *p * 2.0 + Vec3::new(50.0, -20.0, 7.0));
+    mesh.points
+        .iter_mut()
+        .for_each(|p| *p = turn * *p * 2.0 + Vec3::new(50.0, -20.0, 7.0));
     let after = build(&mesh);
     assert!((volume(&after) / before.0 - 8.0).abs() < 1e-11);
     assert!((area(&after) / before.1 - 4.0).abs() < 1e-11);
@@ -122,14 +153,19 @@ fn volume_and_area_follow_motion_and_scale() {
 #[test]
 fn folds_are_reported_with_their_place() {
     let mut mesh = shapes::block(3);
-    let middle = (0..mesh.points.len()).find(|&k| mesh.points[k] == Vec3::new(1.0, 1.0, 3.0)).expect("a point on top");
+    let middle = (0..mesh.points.len())
+        .find(|&k| mesh.points[k] == Vec3::new(1.0, 1.0, 3.0))
+        .expect("a point on top");
     let monitor = Monitor::default();
     patches(&mesh, &PatchOptions::default(), &monitor).expect("a valid mesh");
     assert!(monitor.warnings().is_empty());
     mesh.points[middle] = Vec3::new(6.0, 6.0, 3.0);
     patches(&mesh, &PatchOptions::default(), &monitor).expect("a valid mesh");
     let warnings = monitor.warnings();
-    assert!(warnings.len() == 1 && warnings[0].text.contains("worst: quad"), "{warnings:?}");
+    assert!(
+        warnings.len() == 1 && warnings[0].text.contains("worst: quad"),
+        "{warnings:?}"
+    );
 }
 
 #[test]
@@ -144,7 +180,10 @@ fn one_and_two_threads_give_the_same_bits() {
     let mut mesh = shapes::frame();
     shapes::jitter(&mut mesh, 0.1, 9);
     let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads");
         pool.install(|| {
             let patches = build(&mesh);
             let volume = volume(&patches);
@@ -167,5 +206,18 @@ proptest! {
             assert_shared_rows("cubes", &mesh, &patches);
             prop_assert!(volume(&patches) > 0.0);
         }
+    }
+
+    #[test]
+    fn soups_are_refused_without_panic(quads in prop::collection::vec(prop::array::uniform4(0u32..9), 0..12)) {
+        let points = (0..9).map(|k| Vec3::new(f64::from(k % 3), f64::from(k / 3), f64::from(k * k))).collect();
+        let mesh = ControlMesh { points, quads };
+        let result = patches(&mesh, &PatchOptions::default(), &Monitor::default());
+        if let Err(error) = &result {
+            prop_assert!(!error.to_string().is_empty() && error.hint().is_some());
+        }
+        let patches = result.unwrap_or_default();
+        prop_assert_eq!(build_brep(&mesh, &patches, &BrepOptions::default(), &Monitor::default()).is_ok(), !patches.is_empty());
+        prop_assert_eq!(tessellate(&mesh, &patches, &TessellateOptions::default()).is_ok(), !patches.is_empty());
     }
 }

@@ -25,7 +25,8 @@ pub fn voxels(cells: &[[i32; 3]]) -> ControlMesh {
                     p[(axis + 1) % 3] += b;
                     p[(axis + 2) % 3] += c;
                     *numbers.entry(p).or_insert_with(|| {
-                        mesh.points.push(Vec3::new(p[0].into(), p[1].into(), p[2].into()));
+                        mesh.points
+                            .push(Vec3::new(p[0].into(), p[1].into(), p[2].into()));
                         mesh.points.len() as u32 - 1
                     })
                 });
@@ -41,25 +42,49 @@ pub fn voxels(cells: &[[i32; 3]]) -> ControlMesh {
 
 pub fn block(n: i32) -> ControlMesh {
     let range = 0..n;
-    let cells: Vec<[i32; 3]> =
-        range.clone().flat_map(|i| range.clone().flat_map(move |j| (0..n).map(move |k| [i, j, k]))).collect();
+    let cells: Vec<[i32; 3]> = range
+        .clone()
+        .flat_map(|i| {
+            range
+                .clone()
+                .flat_map(move |j| (0..n).map(move |k| [i, j, k]))
+        })
+        .collect();
     voxels(&cells)
 }
 
 /// Valences 3 and 6, every second edge between extraordinary points.
 pub fn plus() -> ControlMesh {
-    voxels(&[[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
+    voxels(&[
+        [0, 0, 0],
+        [1, 0, 0],
+        [-1, 0, 0],
+        [0, 1, 0],
+        [0, -1, 0],
+        [0, 0, 1],
+        [0, 0, -1],
+    ])
 }
 
 /// Valences 3, 4, 5 and 6.
 pub fn bracket() -> ControlMesh {
-    voxels(&[[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [0, 0, 1], [2, 1, 0], [2, 2, 0]])
+    voxels(&[
+        [0, 0, 0],
+        [1, 0, 0],
+        [2, 0, 0],
+        [0, 1, 0],
+        [0, 0, 1],
+        [2, 1, 0],
+        [2, 2, 0],
+    ])
 }
 
 /// A frame of cubes around a hole.
 pub fn frame() -> ControlMesh {
-    let cells: Vec<[i32; 3]> =
-        (0..5).flat_map(|i| (0..4).map(move |j| [i, j, 0])).filter(|[i, j, _]| *i == 0 || *i == 4 || *j == 0 || *j == 3).collect();
+    let cells: Vec<[i32; 3]> = (0..5)
+        .flat_map(|i| (0..4).map(move |j| [i, j, 0]))
+        .filter(|[i, j, _]| *i == 0 || *i == 4 || *j == 0 || *j == 3)
+        .collect();
     voxels(&cells)
 }
 
@@ -68,13 +93,19 @@ pub fn torus(m: u32, n: u32) -> ControlMesh {
     let angle = |k: u32, of: u32| std::f64::consts::TAU * f64::from(k) / f64::from(of);
     let point = |i: u32, j: u32| {
         let radius = 5.0 + 2.0 * angle(j, n).cos();
-        Vec3::new(radius * angle(i, m).cos(), radius * angle(i, m).sin(), 2.0 * angle(j, n).sin())
+        Vec3::new(
+            radius * angle(i, m).cos(),
+            radius * angle(i, m).sin(),
+            2.0 * angle(j, n).sin(),
+        )
     };
     let at = |i: u32, j: u32| (i % m) * n + j % n;
     let grid = || (0..m).flat_map(move |i| (0..n).map(move |j| (i, j)));
     ControlMesh {
         points: grid().map(|(i, j)| point(i, j)).collect(),
-        quads: grid().map(|(i, j)| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]).collect(),
+        quads: grid()
+            .map(|(i, j)| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)])
+            .collect(),
     }
 }
 
@@ -91,9 +122,13 @@ pub fn two_bodies() -> ControlMesh {
 
 /// Moves every point by up to `size` in each direction.
 pub fn jitter(mesh: &mut ControlMesh, size: f64, seed: u64) {
-    let mut state = seed.wrapping_mul(2862933555777941757).wrapping_add(3037000493);
+    let mut state = seed
+        .wrapping_mul(2862933555777941757)
+        .wrapping_add(3037000493);
     for x in mesh.points.iter_mut().flat_map(|p| p.iter_mut()) {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
         *x += size * ((state >> 11) as f64 / (1u64 << 52) as f64 - 1.0);
     }
 }
@@ -122,19 +157,38 @@ pub fn bodies() -> Vec<(String, ControlMesh)> {
         println!("skipped: no bodies (set GRASSFIRE_BODIES to a folder of <part>/fit.obj)");
         return Vec::new();
     };
-    let mut parts: Vec<PathBuf> =
-        std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+    let mut parts: Vec<PathBuf> = std::fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path())
+        .collect();
     parts.sort();
-    let files = parts.iter().flat_map(|part| ["fit.obj", "body.obj"].map(|name| part.join(name)));
-    files.filter(|file| file.is_file()).map(|file| (file.display().to_string(), read_obj(&file))).collect()
+    let files = parts
+        .iter()
+        .flat_map(|part| ["fit.obj", "body.obj"].map(|name| part.join(name)));
+    files
+        .filter(|file| file.is_file())
+        .map(|file| (file.display().to_string(), read_obj(&file)))
+        .collect()
 }
 
 fn read_obj(file: &std::path::Path) -> ControlMesh {
     let mut mesh = ControlMesh::default();
-    for line in std::fs::read_to_string(file).expect("a readable file").lines() {
+    for line in std::fs::read_to_string(file)
+        .expect("a readable file")
+        .lines()
+    {
         let words: Vec<&str> = line.split_whitespace().collect();
         let number = |k: usize| words[k].parse::<f64>().expect("a number");
-        let index = |k: usize| words[k].split('/').next().and_then(|w| w.parse::<u32>().ok()).expect("an index") - 1;
+        let index = |k: usize| {
+            words[k]
+                .split('/')
+                .next()
+                .and_then(|w| w.parse::<u32>().ok())
+                .expect("an index")
+                - 1
+        };
         match words.first() {
             Some(&"v") => mesh.points.push(Vec3::new(number(1), number(2), number(3))),
             Some(&"f") => mesh.quads.push([index(1), index(2), index(3), index(4)]),
@@ -152,6 +206,11 @@ pub fn euler(mesh: &ControlMesh) -> i64 {
 
 /// Length of the diagonal of the box around the mesh.
 pub fn diagonal(mesh: &ControlMesh) -> f64 {
-    let (low, high) = mesh.points.iter().fold((mesh.points[0], mesh.points[0]), |(l, h), p| (l.inf(p), h.sup(p)));
+    let (low, high) = mesh
+        .points
+        .iter()
+        .fold((mesh.points[0], mesh.points[0]), |(l, h), p| {
+            (l.inf(p), h.sup(p))
+        });
     (high - low).norm()
 }
