@@ -25,46 +25,136 @@ enum Want {
 use Want::{Density, Mesh, Refused};
 
 const TABLE: &[(&str, Want)] = &[
-    ("01_open_hole.stl", Mesh(BRACKET, &["1 holes filled", "mm2"])),
+    (
+        "01_open_hole.stl",
+        Mesh(BRACKET, &["1 holes filled", "mm2"]),
+    ),
     ("02_open_1pct_missing.stl", Mesh(BRACKET, &["holes filled"])),
-    ("03_duplicate_faces.stl", Mesh(BRACKET, &["2000 double faces dropped"])),
-    ("04_inverted_all.stl", Mesh(BRACKET, &["1 of 1 shells were inside out"])),
-    ("05_inverted_patch.stl", Mesh(BRACKET, &["faces turned to agree"])),
-    ("06_inverted_random20pct.stl", Mesh(BRACKET, &["faces turned to agree"])),
-    ("07_nonmanifold_fins.stl", Mesh(PLATE, &["152 faces of fins dropped", "48 faces without area"])),
-    ("08_nonmanifold_vertex.stl", Mesh(2000.0, &["2 separate bodies"])),
-    ("09_nonmanifold_edge.stl", Mesh(2000.0, &["1 edges with more than two faces"])),
-    ("10_self_intersect_overlap.stl", Mesh(2.0 * BRACKET, &["overlap", "unites"])),
-    ("11_self_intersect_noise.stl", Mesh(BRACKET, &[])),
+    (
+        "03_duplicate_faces.stl",
+        Mesh(BRACKET, &["2000 double faces dropped"]),
+    ),
+    (
+        "04_inverted_all.stl",
+        Mesh(BRACKET, &["1 of 1 shells were inside out"]),
+    ),
+    (
+        "05_inverted_patch.stl",
+        Mesh(BRACKET, &["faces turned to agree"]),
+    ),
+    (
+        "06_inverted_random20pct.stl",
+        Mesh(BRACKET, &["faces turned to agree"]),
+    ),
+    (
+        "07_nonmanifold_fins.stl",
+        Mesh(
+            PLATE,
+            &["152 faces of fins dropped", "48 faces without area"],
+        ),
+    ),
+    (
+        "08_nonmanifold_vertex.stl",
+        Mesh(2000.0, &["2 separate bodies"]),
+    ),
+    (
+        "09_nonmanifold_edge.stl",
+        Mesh(2000.0, &["1 edges with more than two faces"]),
+    ),
+    (
+        "10_self_intersect_overlap.stl",
+        Mesh(2.0 * BRACKET, &["overlap", "unites"]),
+    ),
+    (
+        "11_self_intersect_noise.stl",
+        Mesh(BRACKET, &["faces run through others"]),
+    ),
     ("12_tiny_islands.stl", Mesh(BRACKET, &["60 pieces"])),
-    ("13_cavity_outward_normals.stl", Mesh(64_000.0 - 7171.0, &["taken as voids (1 of them had outward"])),
-    ("14_nan_coords.stl", Mesh(BRACKET, &["25 faces with coordinates NaN", "holes filled"])),
-    ("15_inf_coords.stl", Mesh(BRACKET, &["3 faces with coordinates NaN or infinite", "holes filled"])),
-    ("16_huge_offset_1e7.stl", Mesh(BRACKET, &["numbers step by 1.000 mm"])),
+    (
+        "13_cavity_outward_normals.stl",
+        Mesh(
+            64_000.0 - 7171.0,
+            &["taken as voids (1 of them had outward"],
+        ),
+    ),
+    (
+        "14_nan_coords.stl",
+        Mesh(BRACKET, &["25 faces with coordinates NaN", "holes filled"]),
+    ),
+    (
+        "15_inf_coords.stl",
+        Mesh(
+            BRACKET,
+            &["3 faces with coordinates NaN or infinite", "holes filled"],
+        ),
+    ),
+    (
+        "16_huge_offset_1e7.stl",
+        Mesh(BRACKET, &["numbers step by 1.000 mm"]),
+    ),
     ("17_huge_scale_1e30.stl", Refused(&["mm long", "limit"])),
-    ("18_tiny_scale_1e-7.stl", Mesh(BRACKET * 1e-21, &["check the unit"])),
-    ("19_degenerate_faces.stl", Mesh(BRACKET, &["32 double faces", "768 faces without area dropped"])),
-    ("20_unwelded_cracks.stl", Mesh(BRACKET, &["points united", "71496 open edges"])),
+    (
+        "18_tiny_scale_1e-7.stl",
+        Mesh(BRACKET * 1e-21, &["check the unit"]),
+    ),
+    (
+        "19_degenerate_faces.stl",
+        Mesh(
+            BRACKET,
+            &["32 double faces", "768 faces without area dropped"],
+        ),
+    ),
+    (
+        "20_unwelded_cracks.stl",
+        Mesh(BRACKET, &["points united", "71496 open edges"]),
+    ),
     ("21_ascii_broken_lines.stl", Refused(&["line "])),
     ("22_ascii_truncated.stl", Refused(&["line ", "cut short"])),
     ("23_ascii_crlf_upper_locale.stl", Mesh(PLATE, &[])),
     ("24_binary_starts_with_solid.stl", Mesh(PLATE, &[])),
-    ("25_binary_count_too_big.stl", Mesh(PLATE, &["claims 3476000 facets", "holds 3476"])),
+    (
+        "25_binary_count_too_big.stl",
+        Mesh(PLATE, &["claims 3476000 facets", "holds 3476"]),
+    ),
     ("26_binary_truncated.stl", Refused(&["byte ", "cut short"])),
     ("27_binary_count_4e9.stl", Refused(&["not a solid"])),
     ("28_empty_0byte.stl", Refused(&["empty", "0 bytes"])),
-    ("29_empty_solid_ascii.stl", Refused(&["empty", "no triangles"])),
-    ("30_binary_zero_triangles.stl", Refused(&["empty", "no triangles"])),
-    ("31_obj_bad_indices.obj", Refused(&["line ", "index 99999999", "points"])),
+    (
+        "29_empty_solid_ascii.stl",
+        Refused(&["empty", "no triangles"]),
+    ),
+    (
+        "30_binary_zero_triangles.stl",
+        Refused(&["empty", "no triangles"]),
+    ),
+    (
+        "31_obj_bad_indices.obj",
+        Refused(&["line ", "index 99999999", "points"]),
+    ),
     ("32_zero_thickness_sheet.stl", Refused(&["not a solid"])),
     ("33_single_triangle.stl", Refused(&["not a solid"])),
-    ("34_two_bodies.stl", Mesh(2.0 * STRAP, &["2 separate bodies"])),
+    (
+        "34_two_bodies.stl",
+        Mesh(2.0 * STRAP, &["2 separate bodies"]),
+    ),
     ("35_png_named.stl", Refused(&["not an STL", "PNG"])),
     ("36_step_truncated.step", Refused(&["cut short"])),
-    ("37_step_dangling_ref.step", Refused(&["#99999", "not defined"])),
-    ("38_density_nan_out_of_range.npy", Density(&["3 values NaN", "1 below 0 and 1 above 1"])),
-    ("39_density_all_zero.npy", Refused(&["empty at threshold 0.5"])),
-    ("40_density_checkerboard.npy", Density(&["checkerboard", "13500"])),
+    (
+        "37_step_dangling_ref.step",
+        Refused(&["#99999", "not defined"]),
+    ),
+    (
+        "38_density_nan_out_of_range.npy",
+        Density(&["3 values NaN", "1 below 0 and 1 above 1"]),
+    ),
+    (
+        "39_density_all_zero.npy",
+        Refused(&["empty at threshold 0.5"]),
+    ),
+    (
+        "40_density_checkerboard.npy",
+        Density(&["checkerboard", "13500"]),
+    ),
     ("41_density_2d.npy", Refused(&["shape [30, 30]"])),
 ];
 
@@ -100,7 +190,11 @@ fn complaint(want: Want, got: &Outcome) -> Option<String> {
         (Mesh(volume, words), Outcome::Mesh(report)) => {
             let off = report.volume / volume - 1.0;
             if off.abs() > 0.02 {
-                return Some(format!("volume {} is {:.2} % off", report.volume, 100.0 * off));
+                return Some(format!(
+                    "volume {} is {:.2} % off",
+                    report.volume,
+                    100.0 * off
+                ));
             }
             (words, texts(&report.repairs))
         }
@@ -118,7 +212,11 @@ fn complaint(want: Want, got: &Outcome) -> Option<String> {
 }
 
 fn texts(repairs: &[Repair]) -> String {
-    repairs.iter().map(|r| r.text.as_str()).collect::<Vec<_>>().join("; ")
+    repairs
+        .iter()
+        .map(|r| r.text.as_str())
+        .collect::<Vec<_>>()
+        .join("; ")
 }
 
 fn describe(outcome: &Outcome) -> String {
@@ -141,7 +239,10 @@ fn describe(outcome: &Outcome) -> String {
 fn corpus() -> Option<PathBuf> {
     let named = std::env::var_os("GRASSFIRE_CORPUS").map(PathBuf::from);
     let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let found = named.into_iter().chain([beside]).find(|folder| folder.join("bad").is_dir());
+    let found = named
+        .into_iter()
+        .chain([beside])
+        .find(|folder| folder.join("bad").is_dir());
     if found.is_none() {
         println!("skipped: no corpus");
     }
@@ -155,7 +256,11 @@ fn every_bad_file_gives_what_the_table_says() {
     for (name, want) in TABLE {
         let begin = std::time::Instant::now();
         let got = outcome(&corpus.join("bad").join(name));
-        println!("{name}: {} ms, {}", begin.elapsed().as_millis(), describe(&got));
+        println!(
+            "{name}: {} ms, {}",
+            begin.elapsed().as_millis(),
+            describe(&got)
+        );
         complaints.extend(complaint(*want, &got).map(|c| format!("{name}: {c}")));
     }
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
@@ -165,16 +270,22 @@ fn every_bad_file_gives_what_the_table_says() {
 fn the_table_names_every_bad_file() {
     let Some(corpus) = corpus() else { return };
     let entries = std::fs::read_dir(corpus.join("bad")).expect("the folder is there");
-    let names = entries.filter_map(Result::ok).map(|e| e.file_name().to_string_lossy().into_owned());
-    let unknown: Vec<String> =
-        names.filter(|n| n != "INDEX.md" && !TABLE.iter().any(|(t, _)| t == n)).collect();
+    let names = entries
+        .filter_map(Result::ok)
+        .map(|e| e.file_name().to_string_lossy().into_owned());
+    let unknown: Vec<String> = names
+        .filter(|n| n != "INDEX.md" && !TABLE.iter().any(|(t, _)| t == n))
+        .collect();
     assert!(unknown.is_empty(), "not in the table: {unknown:?}");
 }
 
 #[test]
 fn strict_refuses_what_would_be_repaired_and_passes_the_clean_file() {
     let Some(corpus) = corpus() else { return };
-    let strict = RepairOptions { strict: true, ..RepairOptions::default() };
+    let strict = RepairOptions {
+        strict: true,
+        ..RepairOptions::default()
+    };
     let monitor = Monitor::default();
     let run = |name: &str| match read_input(&corpus.join(name), &ReadOptions::default(), &monitor) {
         Ok(Input::Mesh { mesh, .. }) => repair(mesh, &strict, &monitor),
@@ -205,10 +316,20 @@ fn clean_parts_pass_unchanged() {
     for (name, volume, components) in parts {
         let got = outcome(&corpus.join("dev").join(name));
         println!("{name}: {}", describe(&got));
-        let Outcome::Mesh(report) = got else { panic!("{name} is refused") };
-        assert!((report.volume / volume - 1.0).abs() < 2e-3, "{name}: {}", report.volume);
+        let Outcome::Mesh(report) = got else {
+            panic!("{name} is refused")
+        };
+        assert!(
+            (report.volume / volume - 1.0).abs() < 2e-3,
+            "{name}: {}",
+            report.volume
+        );
         assert_eq!(report.components, components, "{name}");
-        assert!(!report.repairs.iter().any(|r| r.kind.changes_mesh()), "{name}: {}", texts(&report.repairs));
+        assert!(
+            !report.repairs.iter().any(|r| r.kind.changes_mesh()),
+            "{name}: {}",
+            texts(&report.repairs)
+        );
     }
 }
 
@@ -216,14 +337,25 @@ fn clean_parts_pass_unchanged() {
 fn repaired_meshes_do_not_depend_on_the_thread_count() {
     let Some(corpus) = corpus() else { return };
     let run = |threads: usize, name: &str| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a small pool");
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a small pool");
         let path = corpus.join("bad").join(name);
-        pool.install(|| match read_input(&path, &ReadOptions::default(), &Monitor::default()) {
-            Ok(Input::Mesh { mesh, .. }) => repair(mesh, &RepairOptions::default(), &Monitor::default()).ok(),
-            _ => None,
-        })
+        pool.install(
+            || match read_input(&path, &ReadOptions::default(), &Monitor::default()) {
+                Ok(Input::Mesh { mesh, .. }) => {
+                    repair(mesh, &RepairOptions::default(), &Monitor::default()).ok()
+                }
+                _ => None,
+            },
+        )
     };
-    for name in ["02_open_1pct_missing.stl", "12_tiny_islands.stl", "20_unwelded_cracks.stl"] {
+    for name in [
+        "02_open_1pct_missing.stl",
+        "12_tiny_islands.stl",
+        "20_unwelded_cracks.stl",
+    ] {
         let one = run(1, name);
         assert!(one.is_some() && one == run(2, name), "{name}");
     }

@@ -15,7 +15,10 @@ pub fn atomic_write(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> Result<(), IoError> {
-    let fail = |source| IoError::Write { file: path.display().to_string(), source };
+    let fail = |source| IoError::Write {
+        file: path.display().to_string(),
+        source,
+    };
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -58,6 +61,11 @@ mod tests {
     #[test]
     fn missing_folder_is_named() {
         let error = atomic_write(Path::new("no/such/folder/a.txt"), |_| Ok(())).unwrap_err();
-        assert!(error.to_string().starts_with("no/such/folder/a.txt: cannot be written"), "{error}");
+        assert!(
+            error
+                .to_string()
+                .starts_with("no/such/folder/a.txt: cannot be written"),
+            "{error}"
+        );
     }
 }

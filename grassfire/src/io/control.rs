@@ -12,7 +12,11 @@ use crate::spline::ControlMesh;
 ///
 /// # Errors
 /// As [`read_control_mesh_bytes`], and [`IoError::Open`].
-pub fn read_control_mesh(path: &Path, options: &ReadOptions, monitor: &Monitor) -> Result<ControlMesh, IoError> {
+pub fn read_control_mesh(
+    path: &Path,
+    options: &ReadOptions,
+    monitor: &Monitor,
+) -> Result<ControlMesh, IoError> {
     let bytes = read_file(path, options.max_file_bytes)?;
     read_control_mesh_bytes(&path.display().to_string(), &bytes, options, monitor)
 }
@@ -21,19 +25,45 @@ pub fn read_control_mesh(path: &Path, options: &ReadOptions, monitor: &Monitor) 
 ///
 /// # Errors
 /// [`IoError::Element`] names the first face that is not a quad; [`IoError::Line`] for damaged lines.
-pub fn read_control_mesh_bytes(name: &str, bytes: &[u8], options: &ReadOptions, monitor: &Monitor) -> Result<ControlMesh, IoError> {
-    let src = Source { name, bytes, options, monitor };
+pub fn read_control_mesh_bytes(
+    name: &str,
+    bytes: &[u8],
+    options: &ReadOptions,
+    monitor: &Monitor,
+) -> Result<ControlMesh, IoError> {
+    let src = Source {
+        name,
+        bytes,
+        options,
+        monitor,
+    };
     let data = parse_obj(&src)?;
     let mut mesh = ControlMesh::default();
     for (index, polygon) in data.polygons().enumerate() {
-        let wrong = |_| src.element("face", index, format!("has {} corners, a control mesh has quads only", polygon.len()));
+        let wrong = |_| {
+            src.element(
+                "face",
+                index,
+                format!(
+                    "has {} corners, a control mesh has quads only",
+                    polygon.len()
+                ),
+            )
+        };
         mesh.quads.push(polygon.try_into().map_err(wrong)?);
     }
     if mesh.quads.is_empty() {
-        return Err(IoError::Empty { file: src.file(), what: "no quads" });
+        return Err(IoError::Empty {
+            file: src.file(),
+            what: "no quads",
+        });
     }
     mesh.points = data.points;
-    if let Some(index) = mesh.points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+    if let Some(index) = mesh
+        .points
+        .iter()
+        .position(|p| !p.iter().all(|x| x.is_finite()))
+    {
         return Err(src.element("point", index, "has a coordinate that is not finite"));
     }
     mesh.points.iter_mut().for_each(|p| *p *= options.scale);

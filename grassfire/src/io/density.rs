@@ -20,25 +20,40 @@ pub(super) fn cubic(
     values: Vec<f32>,
     notes: &mut Vec<Repair>,
 ) -> Result<VoxelGrid<f32>, IoError> {
-    if !(spacing.iter().all(|h| h.is_finite() && *h > 0.0) && origin.iter().all(|x| x.is_finite())) {
-        return Err(src.format(format!("spacing {spacing:?} or origin {origin:?} is not usable")));
+    if !(spacing.iter().all(|h| h.is_finite() && *h > 0.0) && origin.iter().all(|x| x.is_finite()))
+    {
+        return Err(src.format(format!(
+            "spacing {spacing:?} or origin {origin:?} is not usable"
+        )));
     }
     if values.len() != src.check_voxels(dims)? {
         return Err(src.format(format!("{} values for {dims:?} voxels", values.len())));
     }
     let smallest = spacing.iter().copied().fold(f64::INFINITY, f64::min);
     let largest = spacing.iter().copied().fold(0.0, f64::max);
-    let grid = VoxelGrid { origin, spacing: smallest, dims, values };
+    let grid = VoxelGrid {
+        origin,
+        spacing: smallest,
+        dims,
+        values,
+    };
     if largest <= smallest * (1.0 + EQUAL) {
         return Ok(grid);
     }
-    let text = format!("voxels of {} x {} x {} interpolated to cubes of {smallest}", spacing[0], spacing[1], spacing[2]);
+    let text = format!(
+        "voxels of {} x {} x {} interpolated to cubes of {smallest}",
+        spacing[0], spacing[1], spacing[2]
+    );
     notes.push(Repair::new(RepairKind::Resampled, grid.values.len(), text));
     resample(src, grid, spacing)
 }
 
 /// Linear interpolation between voxel centres along each axis.
-fn resample(src: &Source, grid: VoxelGrid<f32>, spacing: [f64; 3]) -> Result<VoxelGrid<f32>, IoError> {
+fn resample(
+    src: &Source,
+    grid: VoxelGrid<f32>,
+    spacing: [f64; 3],
+) -> Result<VoxelGrid<f32>, IoError> {
     let h = grid.spacing;
     let ratio = spacing.map(|s| s / h);
     // The new voxels fill the same box; half a voxel may stick out where the box is no multiple.
@@ -47,7 +62,11 @@ fn resample(src: &Source, grid: VoxelGrid<f32>, spacing: [f64; 3]) -> Result<Vox
     src.check_voxels(dims)?;
     let origin = Vec3::from_fn(|a, _| grid.origin[a] - spacing[a] / 2.0 + h / 2.0);
     let mut out = VoxelGrid::filled(grid.origin, h, dims, 0.0f32);
-    let source = VoxelGrid { origin: Vec3::zeros(), spacing: 1.0, ..grid };
+    let source = VoxelGrid {
+        origin: Vec3::zeros(),
+        spacing: 1.0,
+        ..grid
+    };
     for k in 0..dims[2] {
         src.monitor.check()?;
         for j in 0..dims[1] {
@@ -64,11 +83,22 @@ fn resample(src: &Source, grid: VoxelGrid<f32>, spacing: [f64; 3]) -> Result<Vox
 }
 
 /// Scales lengths and values, mends a few bad values, refuses many; refuses a grid without material.
-pub(super) fn check(src: &Source, mut grid: VoxelGrid<f32>, notes: &mut Vec<Repair>) -> Result<VoxelGrid<f32>, IoError> {
+pub(super) fn check(
+    src: &Source,
+    mut grid: VoxelGrid<f32>,
+    notes: &mut Vec<Repair>,
+) -> Result<VoxelGrid<f32>, IoError> {
     let options = src.options;
-    for (name, value) in [("density_scale", options.density_scale), ("threshold", options.threshold)] {
+    for (name, value) in [
+        ("density_scale", options.density_scale),
+        ("threshold", options.threshold),
+    ] {
         if !(value.is_finite() && value > 0.0) {
-            return Err(IoError::Option { name, value: value.to_string(), want: "a positive number" });
+            return Err(IoError::Option {
+                name,
+                value: value.to_string(),
+                want: "a positive number",
+            });
         }
     }
     grid.origin *= options.scale;
@@ -91,16 +121,29 @@ pub(super) fn check(src: &Source, mut grid: VoxelGrid<f32>, notes: &mut Vec<Repa
     let (outside, total) = (nan + below + above, grid.values.len());
     let limit = (options.max_outside_share * total as f64) as usize;
     if outside > limit {
-        return Err(IoError::OutsideRange { file: src.file(), count: outside, total, smallest, largest, limit });
+        return Err(IoError::OutsideRange {
+            file: src.file(),
+            count: outside,
+            total,
+            smallest,
+            largest,
+            limit,
+        });
     }
     if outside > 0 {
-        let text = format!("{nan} values NaN taken as 0, {below} below 0 and {above} above 1 clamped (smallest {smallest}, largest {largest})");
+        let text = format!(
+            "{nan} values NaN taken as 0, {below} below 0 and {above} above 1 clamped (smallest {smallest}, largest {largest})"
+        );
         notes.push(Repair::new(RepairKind::Clamped, outside, text));
     }
     let threshold = options.threshold as f32;
     if grid.values.iter().all(|v| *v < threshold) {
         let largest = if largest.is_finite() { largest } else { 0.0 };
-        return Err(IoError::EmptyAtThreshold { file: src.file(), threshold: options.threshold, largest });
+        return Err(IoError::EmptyAtThreshold {
+            file: src.file(),
+            threshold: options.threshold,
+            largest,
+        });
     }
     note_loose_voxels(&grid, threshold, notes);
     Ok(grid)
@@ -130,7 +173,9 @@ fn note_loose_voxels(grid: &VoxelGrid<f32>, threshold: f32, notes: &mut Vec<Repa
         }
     }
     if loose * 20 > count {
-        let text = format!("checkerboard: {loose} of {count} voxels of material touch no other by a face; a density filter is missing");
+        let text = format!(
+            "checkerboard: {loose} of {count} voxels of material touch no other by a face; a density filter is missing"
+        );
         notes.push(Repair::new(RepairKind::Checkerboard, loose, text));
     }
 }

@@ -29,7 +29,10 @@ const FOREIGN: &[(&[u8], &str)] = &[
     (b"\x7fELF", "a program"),
     (b"MZ", "a program"),
     (b"\x89HDF", "an HDF5 file"),
-    (b"# vtk DataFile", "a legacy VTK file (save it as .vti or .vtu)"),
+    (
+        b"# vtk DataFile",
+        "a legacy VTK file (save it as .vti or .vtu)",
+    ),
     (b"glTF", "a glTF file"),
     (b"<!DOCTYPE", "a web page"),
     (b"<html", "a web page"),
@@ -41,7 +44,10 @@ const HEAD: usize = 4096;
 pub(super) fn detect(src: &Source) -> Result<Format, IoError> {
     let bytes = src.bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(src.bytes);
     if bytes.is_empty() {
-        return Err(IoError::Empty { file: src.file(), what: "0 bytes" });
+        return Err(IoError::Empty {
+            file: src.file(),
+            what: "0 bytes",
+        });
     }
     if let Some(format) = by_magic(bytes) {
         return Ok(format);
@@ -58,7 +64,11 @@ pub(super) fn detect(src: &Source) -> Result<Format, IoError> {
         "npy" => "an NPY file",
         _ => "a readable file",
     };
-    let not = |found: String| IoError::NotA { file: src.file(), expected, found };
+    let not = |found: String| IoError::NotA {
+        file: src.file(),
+        expected,
+        found,
+    };
     // The exact size proves a binary STL, whatever its 80 free header bytes look like.
     if stl::has_exact_binary_size(bytes) {
         return Ok(Format::StlBinary);
@@ -71,13 +81,20 @@ pub(super) fn detect(src: &Source) -> Result<Format, IoError> {
             _ if starts_with_word(bytes, b"solid") => Ok(Format::StlAscii),
             "obj" => Ok(Format::Obj),
             _ if looks_like_obj(bytes) => Ok(Format::Obj),
-            _ => Err(not(format!("the text begins with {}", quote(first_line(bytes))))),
+            _ => Err(not(format!(
+                "the text begins with {}",
+                quote(first_line(bytes))
+            ))),
         };
     }
-    if (extension == "stl" || starts_with_word(bytes, b"solid")) && stl::is_plausible_binary(bytes) {
+    if (extension == "stl" || starts_with_word(bytes, b"solid")) && stl::is_plausible_binary(bytes)
+    {
         return Ok(Format::StlBinary);
     }
-    Err(not(format!("it begins with the bytes {}", quote(&bytes[..bytes.len().min(8)]))))
+    Err(not(format!(
+        "it begins with the bytes {}",
+        quote(&bytes[..bytes.len().min(8)])
+    )))
 }
 
 fn by_magic(bytes: &[u8]) -> Option<Format> {
@@ -101,30 +118,50 @@ fn by_magic(bytes: &[u8]) -> Option<Format> {
 }
 
 fn extension(name: &str) -> String {
-    std::path::Path::new(name).extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
+    std::path::Path::new(name)
+        .extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default()
 }
 
 /// No zero byte and hardly a control character in the first bytes.
 fn is_text(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(HEAD)];
-    let control = head.iter().filter(|b| b.is_ascii_control() && !b.is_ascii_whitespace()).count();
+    let control = head
+        .iter()
+        .filter(|b| b.is_ascii_control() && !b.is_ascii_whitespace())
+        .count();
     !head.contains(&0) && control * 100 <= head.len()
 }
 
 fn starts_with_word(bytes: &[u8], word: &[u8]) -> bool {
-    let start = bytes.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(0);
-    bytes[start..].get(..word.len()).is_some_and(|w| w.eq_ignore_ascii_case(word))
+    let start = bytes
+        .iter()
+        .position(|b| !b.is_ascii_whitespace())
+        .unwrap_or(0);
+    bytes[start..]
+        .get(..word.len())
+        .is_some_and(|w| w.eq_ignore_ascii_case(word))
 }
 
 fn first_line(bytes: &[u8]) -> &[u8] {
-    bytes.split(|&b| b == b'\n' || b == b'\r').find(|l| !l.trim_ascii().is_empty()).unwrap_or_default().trim_ascii()
+    bytes
+        .split(|&b| b == b'\n' || b == b'\r')
+        .find(|l| !l.trim_ascii().is_empty())
+        .unwrap_or_default()
+        .trim_ascii()
 }
 
 /// The first line that says something begins a point or is a keyword of the format.
 fn looks_like_obj(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(HEAD)];
     let lines = head.split(|&b| b == b'\n').map(<[u8]>::trim_ascii);
-    let Some(line) = lines.into_iter().find(|l| !l.is_empty() && !l.starts_with(b"#")) else { return false };
+    let Some(line) = lines
+        .into_iter()
+        .find(|l| !l.is_empty() && !l.starts_with(b"#"))
+    else {
+        return false;
+    };
     let mut words = tokens(line);
     match words.next().unwrap_or_default() {
         b"mtllib" | b"usemtl" | b"o" | b"g" => true,

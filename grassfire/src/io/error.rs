@@ -102,7 +102,9 @@ pub enum IoError {
         largest: f32,
     },
     /// These are no densities.
-    #[error("{file}: {count} of {total} values lie outside 0..1 (smallest {smallest}, largest {largest}); the limit is {limit} of them")]
+    #[error(
+        "{file}: {count} of {total} values lie outside 0..1 (smallest {smallest}, largest {largest}); the limit is {limit} of them"
+    )]
     OutsideRange {
         /// Path.
         file: String,
@@ -136,7 +138,9 @@ pub enum IoError {
         present: String,
     },
     /// A STEP reference to an entity that does not exist.
-    #[error("{file}: line {line}: reference to #{id}, which is not defined ({count} such references)")]
+    #[error(
+        "{file}: line {line}: reference to #{id}, which is not defined ({count} such references)"
+    )]
     DanglingReference {
         /// Path.
         file: String,
@@ -167,12 +171,22 @@ impl IoError {
     pub fn hint(&self) -> Option<String> {
         let text = match self {
             Self::NotA { .. } => "readable are STL, OBJ, PLY, OFF, 3MF, STEP, VTI, VTU and NPY",
-            Self::Empty { .. } => "export the part again; look whether it was hidden or on another layer",
-            Self::Line { what, .. } if what.contains("comma") => "export with a decimal point (locale C or English)",
-            Self::Line { .. } | Self::Byte { .. } => "the file is damaged or cut short: export or copy it again",
+            Self::Empty { .. } => {
+                "export the part again; look whether it was hidden or on another layer"
+            }
+            Self::Line { what, .. } if what.contains("comma") => {
+                "export with a decimal point (locale C or English)"
+            }
+            Self::Line { .. } | Self::Byte { .. } => {
+                "the file is damaged or cut short: export or copy it again"
+            }
             Self::Limit { .. } => "raise the limit in the options if the file is really that large",
-            Self::EmptyAtThreshold { .. } => "lower `threshold`, or check that the array holds densities",
-            Self::OutsideRange { .. } => "set `density_scale` (0.01 for percent), or name another array with `field`",
+            Self::EmptyAtThreshold { .. } => {
+                "lower `threshold`, or check that the array holds densities"
+            }
+            Self::OutsideRange { .. } => {
+                "set `density_scale` (0.01 for percent), or name another array with `field`"
+            }
             Self::Shape { .. } => "set `extrude_layers` to extrude a 2-D array along z",
             Self::Field { .. } => "name the array with `field`",
             Self::DanglingReference { .. } => "the STEP file is damaged: export it again",

@@ -11,7 +11,11 @@ use crate::monitor::Monitor;
 ///
 /// # Errors
 /// As [`read_medial_bytes`], and [`IoError::Open`].
-pub fn read_medial(path: &Path, options: &ReadOptions, monitor: &Monitor) -> Result<MedialMesh, IoError> {
+pub fn read_medial(
+    path: &Path,
+    options: &ReadOptions,
+    monitor: &Monitor,
+) -> Result<MedialMesh, IoError> {
     let bytes = read_file(path, options.max_file_bytes)?;
     read_medial_bytes(&path.display().to_string(), &bytes, options, monitor)
 }
@@ -20,18 +24,35 @@ pub fn read_medial(path: &Path, options: &ReadOptions, monitor: &Monitor) -> Res
 ///
 /// # Errors
 /// [`IoError::Line`] names a damaged line, an index out of range or a count that is not met.
-pub fn read_medial_bytes(name: &str, bytes: &[u8], options: &ReadOptions, monitor: &Monitor) -> Result<MedialMesh, IoError> {
-    let src = Source { name, bytes, options, monitor };
+pub fn read_medial_bytes(
+    name: &str,
+    bytes: &[u8],
+    options: &ReadOptions,
+    monitor: &Monitor,
+) -> Result<MedialMesh, IoError> {
+    let src = Source {
+        name,
+        bytes,
+        options,
+        monitor,
+    };
     let mut lines = src
         .lines()
         .map(|(n, line)| (n, line.split(|&b| b == b'#').next().unwrap_or_default()))
         .filter(|(_, line)| !line.trim_ascii().is_empty());
     let Some((line, first)) = lines.next() else {
-        return Err(IoError::Empty { file: src.file(), what: "no counts" });
+        return Err(IoError::Empty {
+            file: src.file(),
+            what: "no counts",
+        });
     };
     let mut counts = [0; 3];
     let mut words = tokens(first);
-    for (count, what) in counts.iter_mut().zip(["the count of points", "the count of edges", "the count of faces"]) {
+    for (count, what) in counts.iter_mut().zip([
+        "the count of points",
+        "the count of edges",
+        "the count of faces",
+    ]) {
         *count = src.next_index(line, &mut words, what)?;
     }
     let mut mesh = MedialMesh::default();
@@ -47,13 +68,18 @@ pub fn read_medial_bytes(name: &str, bytes: &[u8], options: &ReadOptions, monito
                 let p = src.next_point(n, &mut words)? * options.scale;
                 let radius = src.next_number(n, &mut words, "the radius")? * options.scale;
                 if !(radius >= 0.0 && radius.is_finite() && p.iter().all(|x| x.is_finite())) {
-                    return Err(src.line(n, "a sphere needs a finite centre and a finite radius of at least 0"));
+                    return Err(src.line(
+                        n,
+                        "a sphere needs a finite centre and a finite radius of at least 0",
+                    ));
                 }
                 mesh.points.push(p);
                 mesh.radii.push(radius);
             }
             b"e" => mesh.edges.push(indices(&src, n, &mut words, counts[0])?),
-            b"f" => mesh.triangles.push(indices(&src, n, &mut words, counts[0])?),
+            b"f" => mesh
+                .triangles
+                .push(indices(&src, n, &mut words, counts[0])?),
             other => return Err(src.line(n, format!("{} is none of `v`, `e`, `f`", quote(other)))),
         }
     }
@@ -75,7 +101,10 @@ fn indices<'t, const N: usize>(
     for k in 0..N {
         let index = src.next_index(line, words, "an index")?;
         if index >= points.min(u32::MAX as usize) {
-            return Err(src.line(line, format!("index {index} but there are only {points} points (counted from 0)")));
+            return Err(src.line(
+                line,
+                format!("index {index} but there are only {points} points (counted from 0)"),
+            ));
         }
         out[k] = index as u32;
         if out[..k].contains(&out[k]) {
@@ -87,10 +116,17 @@ fn indices<'t, const N: usize>(
 
 fn drop_triangle_edges(mesh: &mut MedialMesh) {
     let ordered = |a: u32, b: u32| [a.min(b), a.max(b)];
-    let sides = mesh.triangles.iter().flat_map(|t| [ordered(t[0], t[1]), ordered(t[1], t[2]), ordered(t[2], t[0])]);
+    let sides = mesh.triangles.iter().flat_map(|t| {
+        [
+            ordered(t[0], t[1]),
+            ordered(t[1], t[2]),
+            ordered(t[2], t[0]),
+        ]
+    });
     let mut sides: Vec<[u32; 2]> = sides.collect();
     sides.sort_unstable();
-    mesh.edges.retain(|&[a, b]| sides.binary_search(&ordered(a, b)).is_err());
+    mesh.edges
+        .retain(|&[a, b]| sides.binary_search(&ordered(a, b)).is_err());
 }
 
 /// Writes a medial mesh as `.ma`, atomically; every number reads back exactly.
@@ -99,11 +135,21 @@ fn drop_triangle_edges(mesh: &mut MedialMesh) {
 /// [`IoError::Write`].
 pub fn write_medial(path: &Path, mesh: &MedialMesh) -> Result<(), IoError> {
     atomic_write(path, |w| {
-        writeln!(w, "{} {} {}", mesh.points.len(), mesh.edges.len(), mesh.triangles.len())?;
+        writeln!(
+            w,
+            "{} {} {}",
+            mesh.points.len(),
+            mesh.edges.len(),
+            mesh.triangles.len()
+        )?;
         for (p, radius) in mesh.points.iter().zip(&mesh.radii) {
             writeln!(w, "v {} {} {} {radius}", p.x, p.y, p.z)?;
         }
-        mesh.edges.iter().try_for_each(|[a, b]| writeln!(w, "e {a} {b}"))?;
-        mesh.triangles.iter().try_for_each(|[a, b, c]| writeln!(w, "f {a} {b} {c}"))
+        mesh.edges
+            .iter()
+            .try_for_each(|[a, b]| writeln!(w, "e {a} {b}"))?;
+        mesh.triangles
+            .iter()
+            .try_for_each(|[a, b, c]| writeln!(w, "f {a} {b} {c}"))
     })
 }

@@ -130,10 +130,24 @@ pub fn read_input(path: &Path, options: &ReadOptions, monitor: &Monitor) -> Resu
 ///
 /// # Errors
 /// As [`read_input`].
-pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions, monitor: &Monitor) -> Result<Input, IoError> {
-    let src = Source { name, bytes, options, monitor };
+pub fn read_bytes(
+    name: &str,
+    bytes: &[u8],
+    options: &ReadOptions,
+    monitor: &Monitor,
+) -> Result<Input, IoError> {
+    let src = Source {
+        name,
+        bytes,
+        options,
+        monitor,
+    };
     if !(options.scale.is_finite() && options.scale > 0.0) {
-        return Err(IoError::Option { name: "scale", value: options.scale.to_string(), want: "a positive number" });
+        return Err(IoError::Option {
+            name: "scale",
+            value: options.scale.to_string(),
+            want: "a positive number",
+        });
     }
     monitor.step("input", "reading", 0.0)?;
     let mut notes = Vec::new();
@@ -157,37 +171,61 @@ pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions, monitor: &Mon
 
 fn mesh_input(src: &Source, mut mesh: TriMesh, notes: Vec<Repair>) -> Result<Input, IoError> {
     if mesh.triangles.is_empty() {
-        return Err(IoError::Empty { file: src.file(), what: "no triangles" });
+        return Err(IoError::Empty {
+            file: src.file(),
+            what: "no triangles",
+        });
     }
     if src.options.scale != 1.0 {
         mesh.points.iter_mut().for_each(|p| *p *= src.options.scale);
     }
     // One body needs no tags.
-    if mesh.tags.first().is_some_and(|first| mesh.tags.iter().all(|tag| tag == first)) {
+    if mesh
+        .tags
+        .first()
+        .is_some_and(|first| mesh.tags.iter().all(|tag| tag == first))
+    {
         mesh.tags.clear();
     }
     Ok(Input::Mesh { mesh, notes })
 }
 
-fn density_input(src: &Source, grid: VoxelGrid<f32>, mut notes: Vec<Repair>) -> Result<Input, IoError> {
+fn density_input(
+    src: &Source,
+    grid: VoxelGrid<f32>,
+    mut notes: Vec<Repair>,
+) -> Result<Input, IoError> {
     let grid = density::check(src, grid, &mut notes)?;
     Ok(Input::Density { grid, notes })
 }
 
 /// The whole file, if it is a regular one of at most `limit` bytes.
 pub(crate) fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
-    let open = |source| IoError::Open { file: path.display().to_string(), source };
+    let open = |source| IoError::Open {
+        file: path.display().to_string(),
+        source,
+    };
     let file = std::fs::File::open(path).map_err(open)?;
     let data = file.metadata().map_err(open)?;
     if !data.is_file() {
-        return Err(open(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file")));
+        return Err(open(std::io::Error::new(
+            std::io::ErrorKind::InvalidInput,
+            "not a regular file",
+        )));
     }
-    let too_big = |value| IoError::Limit { file: path.display().to_string(), what: "the size in bytes".into(), value, limit };
+    let too_big = |value| IoError::Limit {
+        file: path.display().to_string(),
+        what: "the size in bytes".into(),
+        value,
+        limit,
+    };
     if data.len() > limit {
         return Err(too_big(data.len()));
     }
     let mut bytes = Vec::with_capacity(data.len() as usize);
-    file.take(limit.saturating_add(1)).read_to_end(&mut bytes).map_err(open)?;
+    file.take(limit.saturating_add(1))
+        .read_to_end(&mut bytes)
+        .map_err(open)?;
     if bytes.len() as u64 > limit {
         return Err(too_big(bytes.len() as u64));
     }

@@ -28,17 +28,29 @@ pub(super) fn read(src: &Source, notes: &mut Vec<Repair>) -> Result<VoxelGrid<f3
             shape.remove(axis);
         }
     }
-    let layers = if shape.len() == 2 { src.options.extrude_layers } else { 1 };
+    let layers = if shape.len() == 2 {
+        src.options.extrude_layers
+    } else {
+        1
+    };
     if shape.len() == 2 && layers > 0 {
         shape.insert(0, 1);
     }
     let &[nz, ny, nx] = shape.as_slice() else {
-        return Err(IoError::Shape { file: src.file(), shape: header.shape });
+        return Err(IoError::Shape {
+            file: src.file(),
+            shape: header.shape,
+        });
     };
     let count = src.check_voxels([nx, ny, nz])?;
     src.check_voxels([nx, ny, nz.saturating_mul(layers)])?;
     let data = decode(src, &header, count)?;
-    let values = if header.fortran { transpose(&data, [nx, ny, nz]) } else { data }.repeat(layers);
+    let values = if header.fortran {
+        transpose(&data, [nx, ny, nz])
+    } else {
+        data
+    }
+    .repeat(layers);
     let origin = src.options.origin.map_or_else(Vec3::zeros, Vec3::from);
     if src.options.spacing.is_none() {
         let text = "the file states no voxel size: 1 mm is assumed".to_owned();
@@ -59,27 +71,46 @@ fn read_header(src: &Source) -> Result<Header, IoError> {
         let b = bytes.get(8..12).ok_or_else(cut)?;
         (12, u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize)
     } else {
-        return Err(src.byte(6, format!("NPY version {version} is not known (1 to 3 are)")));
+        return Err(src.byte(
+            6,
+            format!("NPY version {version} is not known (1 to 3 are)"),
+        ));
     };
     if length > MAX_HEADER {
         return Err(src.limit("the length of the header", length, MAX_HEADER));
     }
     let text = bytes.get(start..start + length).ok_or_else(cut)?;
-    let bad = |key: &str| src.byte(start, format!("the header has no valid `{key}`: {}", quote(text)));
-    let descr = value_of(text, b"descr").and_then(string).ok_or_else(|| bad("descr"))?;
+    let bad = |key: &str| {
+        src.byte(
+            start,
+            format!("the header has no valid `{key}`: {}", quote(text)),
+        )
+    };
+    let descr = value_of(text, b"descr")
+        .and_then(string)
+        .ok_or_else(|| bad("descr"))?;
     let fortran = match value_of(text, b"fortran_order") {
         Some(rest) if rest.starts_with(b"True") => true,
         Some(rest) if rest.starts_with(b"False") => false,
         _ => return Err(bad("fortran_order")),
     };
-    let shape = value_of(text, b"shape").and_then(tuple).ok_or_else(|| bad("shape"))?;
-    Ok(Header { descr, fortran, shape, body: start + length })
+    let shape = value_of(text, b"shape")
+        .and_then(tuple)
+        .ok_or_else(|| bad("shape"))?;
+    Ok(Header {
+        descr,
+        fortran,
+        shape,
+        body: start + length,
+    })
 }
 
 /// What follows `'key':` in the header's dictionary.
 fn value_of<'a>(text: &'a [u8], key: &[u8]) -> Option<&'a [u8]> {
     let quoted = [b'\'', b'"'].map(|q| [&[q][..], key, &[q]].concat());
-    let at = quoted.iter().find_map(|k| super::source::find(text, k).map(|at| at + k.len()))?;
+    let at = quoted
+        .iter()
+        .find_map(|k| super::source::find(text, k).map(|at| at + k.len()))?;
     let rest = text[at..].trim_ascii_start();
     Some(rest.strip_prefix(b":")?.trim_ascii_start())
 }
@@ -92,7 +123,10 @@ fn string(rest: &[u8]) -> Option<String> {
 
 fn tuple(rest: &[u8]) -> Option<Vec<usize>> {
     let inner = rest.strip_prefix(b"(")?.split(|&b| b == b')').next()?;
-    let parts = inner.split(|&b| b == b',').map(<[u8]>::trim_ascii).filter(|p| !p.is_empty());
+    let parts = inner
+        .split(|&b| b == b',')
+        .map(<[u8]>::trim_ascii)
+        .filter(|p| !p.is_empty());
     parts.map(parse).collect()
 }
 
@@ -101,11 +135,34 @@ fn decode(src: &Source, header: &Header, count: usize) -> Result<Vec<f32>, IoErr
     let body = src.bytes.get(header.body..).unwrap_or_default();
     let (order, kind) = header.descr.split_at_checked(1).unwrap_or_default();
     let big = order == ">";
-    let unknown = || src.byte(header.body, format!("values of type {} cannot be read (numbers can)", quote(header.descr.as_bytes())));
-    let size: usize = kind.get(1..).and_then(|s| s.parse().ok()).filter(|_| "<>|=".contains(order)).ok_or_else(unknown)?;
+    let unknown = || {
+        src.byte(
+            header.body,
+            format!(
+                "values of type {} cannot be read (numbers can)",
+                quote(header.descr.as_bytes())
+            ),
+        )
+    };
+    if !"f4 f8 b1 u1 i1 u2 i2 u4 i4 u8 i8"
+        .split(' ')
+        .any(|known| known == kind)
+    {
+        return Err(unknown());
+    }
+    let size: usize = kind
+        .get(1..)
+        .and_then(|s| s.parse().ok())
+        .filter(|_| "<>|=".contains(order))
+        .ok_or_else(unknown)?;
     let need = count.saturating_mul(size);
     if need > body.len() {
-        let what = format!("shape {:?} of {} needs {need} bytes, the file holds {}", header.shape, header.descr, body.len());
+        let what = format!(
+            "shape {:?} of {} needs {need} bytes, the file holds {}",
+            header.shape,
+            header.descr,
+            body.len()
+        );
         return Err(src.byte(src.bytes.len(), what));
     }
     let body = &body[..need];
@@ -115,7 +172,11 @@ fn decode(src: &Source, header: &Header, count: usize) -> Result<Vec<f32>, IoErr
                 .map(|b| {
                     let mut raw = [0u8; size_of::<$kind>()];
                     raw.copy_from_slice(b);
-                    (if big { <$kind>::from_be_bytes(raw) } else { <$kind>::from_le_bytes(raw) }) as f32
+                    (if big {
+                        <$kind>::from_be_bytes(raw)
+                    } else {
+                        <$kind>::from_le_bytes(raw)
+                    }) as f32
                 })
                 .collect()
         };

@@ -29,14 +29,19 @@ impl ObjData {
     /// Corner indices of each polygon.
     pub fn polygons(&self) -> impl Iterator<Item = &[u32]> {
         let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        starts.zip(&self.ends).map(|(start, &end)| &self.corners[start..end])
+        starts
+            .zip(&self.ends)
+            .map(|(start, &end)| &self.corners[start..end])
     }
 }
 
 pub(super) fn read(src: &Source, notes: &mut Vec<Repair>) -> Result<TriMesh, IoError> {
     let data = parse_obj(src)?;
     if data.skipped > 0 {
-        let text = format!("{} lines of free-form curves, surfaces or unknown kinds ignored", data.skipped);
+        let text = format!(
+            "{} lines of free-form curves, surfaces or unknown kinds ignored",
+            data.skipped
+        );
         notes.push(Repair::new(RepairKind::Skipped, data.skipped, text));
     }
     let mut mesh = TriMesh::default();
@@ -84,7 +89,7 @@ pub(super) fn parse_obj(src: &Source) -> Result<ObjData, IoError> {
             }
             b"l" => read_polyline(src, number, &mut words, &mut data, &mut ahead)?,
             b"o" | b"g" => group = group.saturating_add(1),
-            b"" | b"vn" | b"vt" | b"vp" | b"s" | b"mtllib" | b"usemtl" | b"p" => {}
+            b"" | b"vn" | b"vt" | b"vp" | b"vc" | b"s" | b"mtllib" | b"usemtl" | b"p" => {}
             word if data.points.is_empty() && data.ends.is_empty() && !word.is_ascii() => {
                 return Err(src.line(number, format!("{} is no OBJ keyword", quote(word))));
             }
@@ -93,9 +98,13 @@ pub(super) fn parse_obj(src: &Source) -> Result<ObjData, IoError> {
     }
     let count = data.points.len();
     match ahead.iter().find(|(_, index)| *index as usize >= count) {
-        Some(&(line, index)) => {
-            Err(src.line(line, format!("index {} but there are only {count} points", u64::from(index) + 1)))
-        }
+        Some(&(line, index)) => Err(src.line(
+            line,
+            format!(
+                "index {} but there are only {count} points",
+                u64::from(index) + 1
+            ),
+        )),
         None => Ok(data),
     }
 }
@@ -111,7 +120,8 @@ fn read_vertex<'t>(
     let fourth = words.next().map(|w| src.number(line, w)).transpose()?;
     let coloured = words.next().is_some();
     data.points.push(p);
-    data.fourth.push(fourth.filter(|_| !coloured).unwrap_or(f64::NAN));
+    data.fourth
+        .push(fourth.filter(|_| !coloured).unwrap_or(f64::NAN));
     if data.points.len() > i32::MAX as usize {
         return Err(src.limit("the number of points", data.points.len(), i32::MAX as usize));
     }
@@ -135,7 +145,10 @@ fn read_corners<'t>(
     }
     let count = data.corners.len() - start;
     if count < 3 {
-        return Err(src.line(line, format!("a face needs 3 corners, this one has {count}")));
+        return Err(src.line(
+            line,
+            format!("a face needs 3 corners, this one has {count}"),
+        ));
     }
     data.ends.push(data.corners.len());
     Ok(())
@@ -166,25 +179,46 @@ fn read_polyline<'t>(
 fn corner(src: &Source, line: usize, word: &[u8], points: usize) -> Result<u32, IoError> {
     let mut parts = word.split(|&b| b == b'/');
     let first = parts.next().unwrap_or_default();
-    let fits = parts.all(|p| p.is_empty() || parse::<i64>(p).is_some()) && word.iter().filter(|&&b| b == b'/').count() <= 2;
+    let fits = parts.all(|p| p.is_empty() || parse::<i64>(p).is_some())
+        && word.iter().filter(|&&b| b == b'/').count() <= 2;
     let index: i64 = match parse(first) {
         Some(index) if fits => index,
-        _ => return Err(src.line(line, format!("corner {} is not of the form 7, 7/1, 7//3 or 7/1/3", quote(word)))),
+        _ => {
+            return Err(src.line(
+                line,
+                format!(
+                    "corner {} is not of the form 7, 7/1, 7//3 or 7/1/3",
+                    quote(word)
+                ),
+            ));
+        }
     };
-    let from_zero = if index < 0 { points as i64 + index } else { index - 1 };
+    let from_zero = if index < 0 {
+        points as i64 + index
+    } else {
+        index - 1
+    };
     match u32::try_from(from_zero) {
         // A point takes bytes: so many cannot follow.
-        Ok(found) if found as usize > src.bytes.len() => {
-            Err(src.line(line, format!("index {index} but there are only {points} points")))
-        }
+        Ok(found) if found as usize > src.bytes.len() => Err(src.line(
+            line,
+            format!("index {index} but there are only {points} points"),
+        )),
         Ok(found) => Ok(found),
         Err(_) if index == 0 => Err(src.line(line, "index 0: OBJ counts from 1")),
-        Err(_) => Err(src.line(line, format!("index {index} but there are only {points} points before this line"))),
+        Err(_) => Err(src.line(
+            line,
+            format!("index {index} but there are only {points} points before this line"),
+        )),
     }
 }
 
 /// Writes points and polygons as OBJ, atomically; every number reads back exactly.
-pub(super) fn write_obj<const N: usize>(path: &std::path::Path, points: &[Vec3], faces: &[[u32; N]]) -> Result<(), IoError> {
+pub(super) fn write_obj<const N: usize>(
+    path: &std::path::Path,
+    points: &[Vec3],
+    faces: &[[u32; N]],
+) -> Result<(), IoError> {
     atomic_write(path, |w| {
         for p in points {
             writeln!(w, "v {} {} {}", p.x, p.y, p.z)?;

@@ -14,17 +14,28 @@ pub(super) fn read(src: &Source, notes: &mut Vec<Repair>) -> Result<TriMesh, IoE
     let (line, first) = lines.next().unwrap_or_default();
     let mut words = tokens(first.strip_prefix(b"\xef\xbb\xbf").unwrap_or(first)).peekable();
     let keyword = words.next().unwrap_or_default();
-    if !matches!(keyword, b"OFF" | b"COFF" | b"NOFF" | b"CNOFF" | b"STOFF" | b"STCOFF" | b"STNOFF") {
-        return Err(src.line(line, format!("{} is not a kind of OFF that can be read", quote(keyword))));
+    if !matches!(
+        keyword,
+        b"OFF" | b"COFF" | b"NOFF" | b"CNOFF" | b"STOFF" | b"STCOFF" | b"STNOFF"
+    ) {
+        return Err(src.line(
+            line,
+            format!("{} is not a kind of OFF that can be read", quote(keyword)),
+        ));
     }
-    if words.peek().is_some_and(|w| w.eq_ignore_ascii_case(b"BINARY")) {
+    if words
+        .peek()
+        .is_some_and(|w| w.eq_ignore_ascii_case(b"BINARY"))
+    {
         return Err(src.line(line, "binary OFF cannot be read, save it as text"));
     }
     // The counts stand on the keyword's line or on the next.
     let mut counts: Vec<&[u8]> = words.collect();
     let mut at = line;
     if counts.is_empty() {
-        let (n, next) = lines.next().ok_or_else(|| src.line(line, "the counts of points and faces are missing"))?;
+        let (n, next) = lines
+            .next()
+            .ok_or_else(|| src.line(line, "the counts of points and faces are missing"))?;
         (counts, at) = (tokens(next).collect(), n);
     }
     let mut counts = counts.into_iter();
@@ -32,12 +43,20 @@ pub(super) fn read(src: &Source, notes: &mut Vec<Repair>) -> Result<TriMesh, IoE
     let faces = src.next_index(at, &mut counts, "the count of faces")?;
     // Every line takes at least two bytes: a lie about the counts is caught before memory is asked for.
     if points.saturating_add(faces) > src.bytes.len() {
-        return Err(src.line(at, format!("{points} points and {faces} faces do not fit into {} bytes", src.bytes.len())));
+        return Err(src.line(
+            at,
+            format!(
+                "{points} points and {faces} faces do not fit into {} bytes",
+                src.bytes.len()
+            ),
+        ));
     }
     let mut mesh = TriMesh::default();
     let mut end = at;
     for index in 0..points {
-        let (n, text) = lines.next().ok_or_else(|| src.line(end, format!("the file ends at point {index} of {points}")))?;
+        let (n, text) = lines
+            .next()
+            .ok_or_else(|| src.line(end, format!("the file ends at point {index} of {points}")))?;
         mesh.points.push(src.next_point(n, &mut tokens(text))?);
         end = n;
         if index % 100_000 == 0 {
@@ -47,7 +66,9 @@ pub(super) fn read(src: &Source, notes: &mut Vec<Repair>) -> Result<TriMesh, IoE
     let mut flat = 0;
     let mut polygon = Vec::new();
     for index in 0..faces {
-        let (n, text) = lines.next().ok_or_else(|| src.line(end, format!("the file ends at face {index} of {faces}")))?;
+        let (n, text) = lines
+            .next()
+            .ok_or_else(|| src.line(end, format!("the file ends at face {index} of {faces}")))?;
         end = n;
         read_face(src, n, text, points, &mut polygon)?;
         flat += usize::from(polygon.len() < 3);
@@ -64,14 +85,23 @@ pub(super) fn read(src: &Source, notes: &mut Vec<Repair>) -> Result<TriMesh, IoE
     Ok(mesh)
 }
 
-fn read_face(src: &Source, line: usize, text: &[u8], points: usize, polygon: &mut Vec<u32>) -> Result<(), IoError> {
+fn read_face(
+    src: &Source,
+    line: usize,
+    text: &[u8],
+    points: usize,
+    polygon: &mut Vec<u32>,
+) -> Result<(), IoError> {
     let mut words = tokens(text);
     let corners = src.next_index(line, &mut words, "the count of corners")?;
     polygon.clear();
     for _ in 0..corners {
         let index = src.next_index(line, &mut words, "a corner")?;
         if index >= points {
-            return Err(src.line(line, format!("corner {index} but there are only {points} points (counted from 0)")));
+            return Err(src.line(
+                line,
+                format!("corner {index} but there are only {points} points (counted from 0)"),
+            ));
         }
         polygon.push(index as u32);
     }

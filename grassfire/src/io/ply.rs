@@ -115,7 +115,9 @@ impl Table {
 
     /// The column of corner indices, under either of its two names.
     pub fn corners(&self) -> Option<&Column> {
-        self.column("vertex_indices").or_else(|| self.column("vertex_index")).filter(|c| c.ends.len() == self.rows)
+        self.column("vertex_indices")
+            .or_else(|| self.column("vertex_index"))
+            .filter(|c| c.ends.len() == self.rows)
     }
 }
 
@@ -123,7 +125,9 @@ impl Column {
     /// The lists of a list column.
     pub fn lists(&self) -> impl Iterator<Item = &[f64]> {
         let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        starts.zip(&self.ends).map(|(start, &end)| &self.values[start..end])
+        starts
+            .zip(&self.ends)
+            .map(|(start, &end)| &self.values[start..end])
     }
 }
 
@@ -135,10 +139,18 @@ pub(super) fn read_mesh(src: &Source, notes: &mut Vec<Repair>) -> Result<TriMesh
     })?;
     let points = points(src, &tables)?;
     let Some(faces) = tables.iter().find(|t| t.name == "face") else {
-        return Err(IoError::Empty { file: src.file(), what: "points without faces" });
+        return Err(IoError::Empty {
+            file: src.file(),
+            what: "points without faces",
+        });
     };
-    let corners = faces.corners().ok_or_else(|| src.format("the faces have no list `vertex_indices`"))?;
-    let mut mesh = TriMesh { points, ..TriMesh::default() };
+    let corners = faces
+        .corners()
+        .ok_or_else(|| src.format("the faces have no list `vertex_indices`"))?;
+    let mut mesh = TriMesh {
+        points,
+        ..TriMesh::default()
+    };
     let mut flat = 0;
     let mut polygon = Vec::new();
     for (index, list) in corners.lists().enumerate() {
@@ -156,9 +168,14 @@ pub(super) fn read_mesh(src: &Source, notes: &mut Vec<Repair>) -> Result<TriMesh
 
 /// The points of element `vertex`.
 pub(super) fn points(src: &Source, tables: &[Table]) -> Result<Vec<Vec3>, IoError> {
-    let vertices = tables.iter().find(|t| t.name == "vertex").ok_or_else(|| src.format("there is no element `vertex`"))?;
+    let vertices = tables
+        .iter()
+        .find(|t| t.name == "vertex")
+        .ok_or_else(|| src.format("there is no element `vertex`"))?;
     let axis = |name: &str| {
-        let column = vertices.column(name).filter(|c| c.values.len() == vertices.rows);
+        let column = vertices
+            .column(name)
+            .filter(|c| c.values.len() == vertices.rows);
         column.ok_or_else(|| src.format(format!("the vertices have no property `{name}`")))
     };
     let (x, y, z) = (axis("x")?, axis("y")?, axis("z")?);
@@ -178,7 +195,11 @@ pub(super) fn corner_indices(
     out.clear();
     for &value in list {
         if !(value >= 0.0 && value < points as f64 && value.fract() == 0.0) {
-            return Err(src.element(element, index, format!("names point {value}, there are {points} (counted from 0)")));
+            return Err(src.element(
+                element,
+                index,
+                format!("names point {value}, there are {points} (counted from 0)"),
+            ));
         }
         out.push(value as u32);
     }
@@ -186,12 +207,26 @@ pub(super) fn corner_indices(
 }
 
 /// Reads the columns that `keep(element, property)` asks for.
-pub(super) fn read_tables(src: &Source, keep: &dyn Fn(&str, &str) -> bool) -> Result<Vec<Table>, IoError> {
+pub(super) fn read_tables(
+    src: &Source,
+    keep: &dyn Fn(&str, &str) -> bool,
+) -> Result<Vec<Table>, IoError> {
     let header = read_header(src)?;
-    let mut rest = Body { bytes: &src.bytes[header.body..], at: 0, line: header.lines };
+    let mut rest = Body {
+        bytes: &src.bytes[header.body..],
+        at: 0,
+        line: header.lines,
+    };
     let mut tables = Vec::new();
     for (name, rows, properties) in &header.elements {
-        check_rows(src, &header, rest.bytes.len() - rest.at, name, *rows, properties)?;
+        check_rows(
+            src,
+            &header,
+            rest.bytes.len() - rest.at,
+            name,
+            *rows,
+            properties,
+        )?;
         let wanted: Vec<bool> = properties.iter().map(|p| keep(name, &p.name)).collect();
         let mut columns: Vec<Column> = properties.iter().map(|_| Column::default()).collect();
         for row in 0..*rows {
@@ -199,19 +234,42 @@ pub(super) fn read_tables(src: &Source, keep: &dyn Fn(&str, &str) -> bool) -> Re
                 src.monitor.check()?;
             }
             match header.encoding {
-                Encoding::Text => rest.text_row(src, name, row, *rows, properties, &wanted, &mut columns)?,
-                order => rest.binary_row(src, &header, order == Encoding::Big, (name, row, *rows), properties, &wanted, &mut columns)?,
+                Encoding::Text => {
+                    rest.text_row(src, name, row, *rows, properties, &wanted, &mut columns)?
+                }
+                order => rest.binary_row(
+                    src,
+                    &header,
+                    order == Encoding::Big,
+                    (name, row, *rows),
+                    properties,
+                    &wanted,
+                    &mut columns,
+                )?,
             }
         }
         let named = properties.iter().map(|p| p.name.clone()).zip(columns);
-        let columns = named.zip(&wanted).filter(|(_, wanted)| **wanted).map(|(column, _)| column).collect();
-        tables.push(Table { name: name.clone(), rows: *rows, columns });
+        let columns = named
+            .zip(&wanted)
+            .filter(|(_, wanted)| **wanted)
+            .map(|(column, _)| column)
+            .collect();
+        tables.push(Table {
+            name: name.clone(),
+            rows: *rows,
+            columns,
+        });
     }
     Ok(tables)
 }
 
 fn read_header(src: &Source) -> Result<Header, IoError> {
-    let mut header = Header { encoding: Encoding::Text, elements: Vec::new(), body: 0, lines: 0 };
+    let mut header = Header {
+        encoding: Encoding::Text,
+        elements: Vec::new(),
+        body: 0,
+        lines: 0,
+    };
     let (mut seen_format, mut properties) = (false, 0);
     while let Some(length) = src.bytes[header.body..].iter().position(|&b| b == b'\n') {
         let line = &src.bytes[header.body..header.body + length];
@@ -228,13 +286,19 @@ fn read_header(src: &Source) -> Result<Header, IoError> {
                     b"ascii" => Encoding::Text,
                     b"binary_little_endian" => Encoding::Little,
                     b"binary_big_endian" => Encoding::Big,
-                    other => return Err(src.line(n, format!("format {} is not known", quote(other)))),
+                    other => {
+                        return Err(src.line(n, format!("format {} is not known", quote(other))));
+                    }
                 };
             }
             b"element" => {
                 let name = words.next().unwrap_or_default();
                 let rows = src.next_index(n, &mut words, "the number of rows")?;
-                header.elements.push((String::from_utf8_lossy(name).into_owned(), rows, Vec::new()));
+                header.elements.push((
+                    String::from_utf8_lossy(name).into_owned(),
+                    rows,
+                    Vec::new(),
+                ));
             }
             b"property" => {
                 let Some((_, _, list)) = header.elements.last_mut() else {
@@ -247,16 +311,28 @@ fn read_header(src: &Source) -> Result<Header, IoError> {
             other => return Err(src.line(n, format!("{} is not a PLY header line", quote(other)))),
         }
         if properties > MAX_PROPERTIES || header.elements.len() > MAX_PROPERTIES {
-            return Err(src.limit("the number of properties", properties.max(header.elements.len()), MAX_PROPERTIES));
+            return Err(src.limit(
+                "the number of properties",
+                properties.max(header.elements.len()),
+                MAX_PROPERTIES,
+            ));
         }
     }
-    Err(src.line(header.lines + 1, "the file ends inside the header: `end_header` is missing"))
+    Err(src.line(
+        header.lines + 1,
+        "the file ends inside the header: `end_header` is missing",
+    ))
 }
 
-fn read_property<'t>(src: &Source, line: usize, mut words: impl Iterator<Item = &'t [u8]>) -> Result<Property, IoError> {
+fn read_property<'t>(
+    src: &Source,
+    line: usize,
+    mut words: impl Iterator<Item = &'t [u8]>,
+) -> Result<Property, IoError> {
     let kind = |word: Option<&[u8]>| {
         let word = word.unwrap_or_default();
-        Kind::parse(word).ok_or_else(|| src.line(line, format!("{} is not a PLY type", quote(word))))
+        Kind::parse(word)
+            .ok_or_else(|| src.line(line, format!("{} is not a PLY type", quote(word))))
     };
     let first = words.next().unwrap_or_default();
     let (list, kind) = if first == b"list" {
@@ -264,20 +340,38 @@ fn read_property<'t>(src: &Source, line: usize, mut words: impl Iterator<Item = 
     } else {
         (None, kind(Some(first))?)
     };
-    let name = words.next().ok_or_else(|| src.line(line, "the property has no name"))?;
-    Ok(Property { name: String::from_utf8_lossy(name).into_owned(), kind, list })
+    let name = words
+        .next()
+        .ok_or_else(|| src.line(line, "the property has no name"))?;
+    Ok(Property {
+        name: String::from_utf8_lossy(name).into_owned(),
+        kind,
+        list,
+    })
 }
 
 /// Refuses a number of rows that cannot fit into the bytes that are left.
-fn check_rows(src: &Source, header: &Header, left: usize, name: &str, rows: usize, properties: &[Property]) -> Result<(), IoError> {
+fn check_rows(
+    src: &Source,
+    header: &Header,
+    left: usize,
+    name: &str,
+    rows: usize,
+    properties: &[Property],
+) -> Result<(), IoError> {
     let least = match header.encoding {
         Encoding::Text => 2 * properties.len(),
-        _ => properties.iter().map(|p| p.list.unwrap_or(p.kind).size()).sum(),
+        _ => properties
+            .iter()
+            .map(|p| p.list.unwrap_or(p.kind).size())
+            .sum(),
     };
     // The last line of a text may lack its end.
     if rows > 0 && (least == 0 || rows.saturating_mul(least) > left + 1) {
         let name = quote(name.as_bytes());
-        return Err(src.format(format!("{rows} rows of element {name} do not fit into the {left} bytes left")));
+        return Err(src.format(format!(
+            "{rows} rows of element {name} do not fit into the {left} bytes left"
+        )));
     }
     Ok(())
 }
@@ -316,7 +410,13 @@ impl<'a> Body<'a> {
         columns: &mut [Column],
     ) -> Result<(), IoError> {
         let Some(line) = self.next_line() else {
-            return Err(src.line(self.line, format!("the file ends at row {row} of {rows} of element {}", quote(name.as_bytes()))));
+            return Err(src.line(
+                self.line,
+                format!(
+                    "the file ends at row {row} of {rows} of element {}",
+                    quote(name.as_bytes())
+                ),
+            ));
         };
         let mut words = tokens(line);
         for ((property, &wanted), column) in properties.iter().zip(wanted).zip(columns) {
@@ -326,7 +426,10 @@ impl<'a> Body<'a> {
             };
             for _ in 0..count {
                 let Some(word) = words.next() else {
-                    let what = format!("too few values for row {row} of element {}", quote(name.as_bytes()));
+                    let what = format!(
+                        "too few values for row {row} of element {}",
+                        quote(name.as_bytes())
+                    );
                     return Err(src.line(self.line, what));
                 };
                 if wanted {
@@ -338,7 +441,13 @@ impl<'a> Body<'a> {
             }
         }
         if words.next().is_some() {
-            return Err(src.line(self.line, format!("too many values for row {row} of element {}", quote(name.as_bytes()))));
+            return Err(src.line(
+                self.line,
+                format!(
+                    "too many values for row {row} of element {}",
+                    quote(name.as_bytes())
+                ),
+            ));
         }
         Ok(())
     }
@@ -356,7 +465,10 @@ impl<'a> Body<'a> {
     ) -> Result<(), IoError> {
         let bytes = self.bytes;
         let cut = || {
-            let what = format!("the file ends inside row {row} of {rows} of element {}", quote(name.as_bytes()));
+            let what = format!(
+                "the file ends inside row {row} of {rows} of element {}",
+                quote(name.as_bytes())
+            );
             src.byte(header.body + bytes.len(), what)
         };
         for ((property, &wanted), column) in properties.iter().zip(wanted).zip(columns) {
@@ -364,16 +476,25 @@ impl<'a> Body<'a> {
                 Some(kind) => {
                     let count = kind.decode(self.take(kind.size()).ok_or_else(cut)?, big);
                     if !(count >= 0.0 && count.fract() == 0.0) {
-                        return Err(src.byte(header.body + self.at, format!("{count} is not a length of a list")));
+                        return Err(src.byte(
+                            header.body + self.at,
+                            format!("{count} is not a length of a list"),
+                        ));
                     }
                     count as usize
                 }
                 None => 1,
             };
             let size = property.kind.size();
-            let data = count.checked_mul(size).and_then(|n| self.take(n)).ok_or_else(cut)?;
+            let data = count
+                .checked_mul(size)
+                .and_then(|n| self.take(n))
+                .ok_or_else(cut)?;
             if wanted {
-                column.values.extend(data.chunks_exact(size).map(|b| property.kind.decode(b, big)));
+                column.values.extend(
+                    data.chunks_exact(size)
+                        .map(|b| property.kind.decode(b, big)),
+                );
                 if property.list.is_some() {
                     column.ends.push(column.values.len());
                 }

@@ -5,24 +5,36 @@ use std::path::Path;
 
 use super::{IoError, atomic_write};
 use crate::Vec3;
-use crate::mesh::TriMesh;
 use crate::medial::MedialMesh;
+use crate::mesh::TriMesh;
 
 /// Writes `mesh` with one named value a point (`thickness`), atomically; ParaView and MeshLab colour by it.
 ///
 /// # Errors
 /// [`IoError::Write`]; [`IoError::Option`] when `values` has another length than the points or `name` is no single word.
-pub fn write_ply(path: &Path, mesh: &TriMesh, scalar: Option<(&str, &[f64])>) -> Result<(), IoError> {
+pub fn write_ply(
+    path: &Path,
+    mesh: &TriMesh,
+    scalar: Option<(&str, &[f64])>,
+) -> Result<(), IoError> {
     if let Some((name, values)) = scalar {
         check_scalar(name, values.len(), mesh.points.len())?;
     }
     atomic_write(path, |w| {
-        writeln!(w, "ply\nformat binary_little_endian 1.0\ncomment grassfire, mm\nelement vertex {}", mesh.points.len())?;
+        writeln!(
+            w,
+            "ply\nformat binary_little_endian 1.0\ncomment grassfire, mm\nelement vertex {}",
+            mesh.points.len()
+        )?;
         writeln!(w, "property double x\nproperty double y\nproperty double z")?;
         if let Some((name, _)) = scalar {
             writeln!(w, "property double {name}")?;
         }
-        writeln!(w, "element face {}\nproperty list uchar uint vertex_indices\nend_header", mesh.triangles.len())?;
+        writeln!(
+            w,
+            "element face {}\nproperty list uchar uint vertex_indices\nend_header",
+            mesh.triangles.len()
+        )?;
         for (i, p) in mesh.points.iter().enumerate() {
             write_point(w, p)?;
             if let Some((_, values)) = scalar {
@@ -40,25 +52,55 @@ pub fn write_ply(path: &Path, mesh: &TriMesh, scalar: Option<(&str, &[f64])>) ->
 pub fn write_poles(path: &Path, medial: &MedialMesh) -> Result<(), IoError> {
     check_scalar("radius", medial.radii.len(), medial.points.len())?;
     atomic_write(path, |w| {
-        writeln!(w, "ply\nformat binary_little_endian 1.0\ncomment grassfire, mm\nelement vertex {}", medial.points.len())?;
-        writeln!(w, "property double x\nproperty double y\nproperty double z\nproperty double radius")?;
-        writeln!(w, "element face {}\nproperty list uchar uint vertex_indices", medial.triangles.len())?;
-        writeln!(w, "element edge {}\nproperty uint vertex1\nproperty uint vertex2\nend_header", medial.edges.len())?;
+        writeln!(
+            w,
+            "ply\nformat binary_little_endian 1.0\ncomment grassfire, mm\nelement vertex {}",
+            medial.points.len()
+        )?;
+        writeln!(
+            w,
+            "property double x\nproperty double y\nproperty double z\nproperty double radius"
+        )?;
+        writeln!(
+            w,
+            "element face {}\nproperty list uchar uint vertex_indices",
+            medial.triangles.len()
+        )?;
+        writeln!(
+            w,
+            "element edge {}\nproperty uint vertex1\nproperty uint vertex2\nend_header",
+            medial.edges.len()
+        )?;
         for (p, radius) in medial.points.iter().zip(&medial.radii) {
             write_point(w, p)?;
             w.write_all(&radius.to_le_bytes())?;
         }
-        medial.triangles.iter().try_for_each(|t| write_triangle(w, t))?;
-        medial.edges.iter().flatten().try_for_each(|v| w.write_all(&v.to_le_bytes()))
+        medial
+            .triangles
+            .iter()
+            .try_for_each(|t| write_triangle(w, t))?;
+        medial
+            .edges
+            .iter()
+            .flatten()
+            .try_for_each(|v| w.write_all(&v.to_le_bytes()))
     })
 }
 
 fn check_scalar(name: &str, values: usize, points: usize) -> Result<(), IoError> {
     if name.is_empty() || name.contains(char::is_whitespace) {
-        return Err(IoError::Option { name: "scalar", value: format!("{name:?}"), want: "one word" });
+        return Err(IoError::Option {
+            name: "scalar",
+            value: format!("{name:?}"),
+            want: "one word",
+        });
     }
     if values != points {
-        return Err(IoError::Option { name: "scalar", value: format!("{values} values for {points} points"), want: "one value a point" });
+        return Err(IoError::Option {
+            name: "scalar",
+            value: format!("{values} values for {points} points"),
+            want: "one value a point",
+        });
     }
     Ok(())
 }
@@ -69,5 +111,7 @@ fn write_point(w: &mut dyn Write, p: &Vec3) -> std::io::Result<()> {
 
 fn write_triangle(w: &mut dyn Write, triangle: &[u32; 3]) -> std::io::Result<()> {
     w.write_all(&[3])?;
-    triangle.iter().try_for_each(|v| w.write_all(&v.to_le_bytes()))
+    triangle
+        .iter()
+        .try_for_each(|v| w.write_all(&v.to_le_bytes()))
 }

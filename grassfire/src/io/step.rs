@@ -12,24 +12,41 @@ use super::source::Source;
 pub(super) fn check(src: &Source) -> Result<(), IoError> {
     let scan = scan(src)?;
     if let Some(line) = scan.open {
-        return Err(src.line(line, "a string or comment begins here and never ends: the file was cut short"));
+        return Err(src.line(
+            line,
+            "a string or comment begins here and never ends: the file was cut short",
+        ));
     }
     if !scan.ended {
         let line = scan.lines;
-        return Err(src.line(line, "the file ends without `END-ISO-10303-21;`: it was cut short"));
+        return Err(src.line(
+            line,
+            "the file ends without `END-ISO-10303-21;`: it was cut short",
+        ));
     }
     if scan.defined.is_empty() {
-        return Err(IoError::Empty { file: src.file(), what: "no entities" });
+        return Err(IoError::Empty {
+            file: src.file(),
+            what: "no entities",
+        });
     }
     let mut defined: Vec<u64> = scan.defined;
     defined.sort_unstable();
     if let Some(twice) = defined.windows(2).find(|pair| pair[0] == pair[1]) {
         return Err(src.format(format!("#{} is defined twice", twice[0])));
     }
-    let missing = scan.used.iter().filter(|(id, _)| defined.binary_search(id).is_err());
+    let missing = scan
+        .used
+        .iter()
+        .filter(|(id, _)| defined.binary_search(id).is_err());
     let count = missing.clone().count();
     match missing.min_by_key(|(_, line)| *line) {
-        Some(&(id, line)) => Err(IoError::DanglingReference { file: src.file(), line, id, count }),
+        Some(&(id, line)) => Err(IoError::DanglingReference {
+            file: src.file(),
+            line,
+            id,
+            count,
+        }),
         None => Ok(()),
     }
 }
@@ -46,7 +63,13 @@ struct Scan {
 
 fn scan(src: &Source) -> Result<Scan, IoError> {
     let bytes = src.bytes;
-    let mut scan = Scan { defined: Vec::new(), used: Vec::new(), ended: false, lines: 1, open: None };
+    let mut scan = Scan {
+        defined: Vec::new(),
+        used: Vec::new(),
+        ended: false,
+        lines: 1,
+        open: None,
+    };
     let mut at = 0;
     while let Some(&b) = bytes.get(at) {
         match b {
@@ -85,10 +108,15 @@ fn skip(scan: &mut Scan, bytes: &[u8], at: usize, opening: usize, end: &[u8]) ->
 }
 
 fn reference(scan: &mut Scan, bytes: &[u8], at: usize) -> usize {
-    let digits = bytes[at + 1..].iter().take_while(|b| b.is_ascii_digit()).count();
+    let digits = bytes[at + 1..]
+        .iter()
+        .take_while(|b| b.is_ascii_digit())
+        .count();
     let end = at + 1 + digits;
     // Ids beyond 64 bits are legal in no program; they count as references to nothing.
-    let id = bytes[at + 1..end].iter().try_fold(0u64, |n, &d| n.checked_mul(10)?.checked_add(u64::from(d - b'0')));
+    let id = bytes[at + 1..end].iter().try_fold(0u64, |n, &d| {
+        n.checked_mul(10)?.checked_add(u64::from(d - b'0'))
+    });
     if digits > 0 {
         let after = bytes[end..].iter().find(|b| !b.is_ascii_whitespace());
         match (id, after) {

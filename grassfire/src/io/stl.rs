@@ -23,11 +23,15 @@ pub(super) fn has_exact_binary_size(bytes: &[u8]) -> bool {
 
 /// The first records hold sensible numbers; told from other binary data when the size does not fit.
 pub(super) fn is_plausible_binary(bytes: &[u8]) -> bool {
-    let Some(body) = bytes.get(HEADER..) else { return false };
+    let Some(body) = bytes.get(HEADER..) else {
+        return false;
+    };
     let records = body.chunks_exact(RECORD).take(200);
     let total = records.len();
     let sensible = |x: f32| x == 0.0 || (1e-30..1e30).contains(&x.abs());
-    let good = records.filter(|r| corners(r).iter().flatten().all(|&x| sensible(x))).count();
+    let good = records
+        .filter(|r| corners(r).iter().flatten().all(|&x| sensible(x)))
+        .count();
     total > 0 && good * 10 >= total * 9
 }
 
@@ -44,7 +48,10 @@ fn corners(record: &[u8]) -> [[f32; 3]; 3] {
 pub(super) fn read_binary(src: &Source, notes: &mut Vec<Repair>) -> Result<TriMesh, IoError> {
     let body = src.bytes.get(HEADER..).unwrap_or_default();
     let Some(claimed) = claimed(src.bytes) else {
-        return Err(src.byte(src.bytes.len(), format!("the file ends inside the {HEADER} byte header of a binary STL")));
+        return Err(src.byte(
+            src.bytes.len(),
+            format!("the file ends inside the {HEADER} byte header of a binary STL"),
+        ));
     };
     let (present, rest) = (body.len() / RECORD, body.len() % RECORD);
     if claimed > present && rest != 0 {
@@ -55,25 +62,37 @@ pub(super) fn read_binary(src: &Source, notes: &mut Vec<Repair>) -> Result<TriMe
     let count = if rest == 0 { present } else { claimed };
     src.check_triangles(count)?;
     if count != claimed {
-        let text = format!("the header claims {claimed} facets, the file holds {count}: the file size is believed");
+        let text = format!(
+            "the header claims {claimed} facets, the file holds {count}: the file size is believed"
+        );
         notes.push(Repair::new(RepairKind::CountMismatch, 1, text));
     } else if body.len() > count * RECORD {
         let extra = body.len() - count * RECORD;
-        notes.push(Repair::new(RepairKind::TrailingData, extra, format!("{extra} bytes behind the last facet ignored")));
+        notes.push(Repair::new(
+            RepairKind::TrailingData,
+            extra,
+            format!("{extra} bytes behind the last facet ignored"),
+        ));
     }
     let mut mesh = soup(count);
     for (t, record) in body.chunks_exact(RECORD).take(count).enumerate() {
         if t % 100_000 == 0 {
             src.monitor.check()?;
         }
-        mesh.points.extend(corners(record).map(|p| Vec3::from(p.map(f64::from))));
-        mesh.triangles.push([3 * t as u32, 3 * t as u32 + 1, 3 * t as u32 + 2]);
+        mesh.points
+            .extend(corners(record).map(|p| Vec3::from(p.map(f64::from))));
+        mesh.triangles
+            .push([3 * t as u32, 3 * t as u32 + 1, 3 * t as u32 + 2]);
     }
     Ok(mesh)
 }
 
 fn soup(count: usize) -> TriMesh {
-    TriMesh { points: Vec::with_capacity(3 * count), triangles: Vec::with_capacity(count), tags: Vec::new() }
+    TriMesh {
+        points: Vec::with_capacity(3 * count),
+        triangles: Vec::with_capacity(count),
+        tags: Vec::new(),
+    }
 }
 
 /// Words of a text with the line of each.
@@ -91,7 +110,10 @@ impl<'a> Words<'a> {
             self.at += 1;
         }
         let rest = &self.bytes[self.at..];
-        let length = rest.iter().position(|b| b.is_ascii_whitespace()).unwrap_or(rest.len());
+        let length = rest
+            .iter()
+            .position(|b| b.is_ascii_whitespace())
+            .unwrap_or(rest.len());
         self.at += length;
         &rest[..length]
     }
@@ -105,17 +127,28 @@ impl<'a> Words<'a> {
         let word = self.next();
         if word.eq_ignore_ascii_case(wanted.as_bytes()) {
             Ok(())
-        } else if word.is_empty() {
-            Err(src.line(self.line, format!("the file ends where `{wanted}` should follow: it was cut short")))
+        } else if self.at == self.bytes.len() {
+            let what = format!(
+                "the file ends with {} where `{wanted}` should stand: it was cut short",
+                quote(word)
+            );
+            Err(src.line(self.line, what))
         } else {
-            Err(src.line(self.line, format!("{} where `{wanted}` should stand", quote(word))))
+            Err(src.line(
+                self.line,
+                format!("{} where `{wanted}` should stand", quote(word)),
+            ))
         }
     }
 }
 
 /// Text STL, any case, any white space, any line ends; several solids become tags.
 pub(super) fn read_ascii(src: &Source, notes: &mut Vec<Repair>) -> Result<TriMesh, IoError> {
-    let mut words = Words { bytes: src.bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(src.bytes), at: 0, line: 1 };
+    let mut words = Words {
+        bytes: src.bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(src.bytes),
+        at: 0,
+        line: 1,
+    };
     let mut mesh = TriMesh::default();
     let (mut solids, mut open) = (0u32, false);
     loop {
@@ -137,7 +170,10 @@ pub(super) fn read_ascii(src: &Source, notes: &mut Vec<Repair>) -> Result<TriMes
         } else if word.is_empty() {
             break;
         } else {
-            return Err(src.line(words.line, format!("{} where `facet` or `endsolid` should stand", quote(word))));
+            return Err(src.line(
+                words.line,
+                format!("{} where `facet` or `endsolid` should stand", quote(word)),
+            ));
         }
     }
     if open {
@@ -153,8 +189,17 @@ fn read_facet(src: &Source, words: &mut Words, mesh: &mut TriMesh) -> Result<(),
         let word = words.next();
         // The stored normal is not used, and some exporters print it as "-nan(ind)".
         let lower = word.to_ascii_lowercase();
-        if parse::<f64>(word).is_none() && !lower.windows(3).any(|w| w == b"nan" || w == b"inf" || w == b"ind") {
-            return Err(number_error(src, words.line, word, "a normal needs three numbers"));
+        if parse::<f64>(word).is_none()
+            && !lower
+                .windows(3)
+                .any(|w| w == b"nan" || w == b"inf" || w == b"ind")
+        {
+            return Err(number_error(
+                src,
+                words.line,
+                word,
+                "a normal needs three numbers",
+            ));
         }
     }
     words.expect(src, "outer")?;
@@ -165,7 +210,9 @@ fn read_facet(src: &Source, words: &mut Words, mesh: &mut TriMesh) -> Result<(),
         let mut p = Vec3::zeros();
         for a in 0..3 {
             let word = words.next();
-            p[a] = parse(word).ok_or_else(|| number_error(src, words.line, word, "a vertex needs three numbers"))?;
+            p[a] = parse(word).ok_or_else(|| {
+                number_error(src, words.line, word, "a vertex needs three numbers")
+            })?;
         }
         mesh.points.push(p);
     }
@@ -177,7 +224,10 @@ fn read_facet(src: &Source, words: &mut Words, mesh: &mut TriMesh) -> Result<(),
 
 fn number_error(src: &Source, line: usize, word: &[u8], rule: &str) -> IoError {
     if word.is_empty() {
-        return src.line(line, format!("the file ends inside a facet, {rule}: it was cut short"));
+        return src.line(
+            line,
+            format!("the file ends inside a facet, {rule}: it was cut short"),
+        );
     }
     match src.number(line, word) {
         Err(IoError::Line { what, .. }) => src.line(line, format!("{what}; {rule}")),
@@ -202,9 +252,15 @@ pub fn write_stl(path: &Path, mesh: &TriMesh) -> Result<(), IoError> {
 }
 
 fn write_facet(w: &mut dyn Write, [a, b, c]: [Vec3; 3]) -> std::io::Result<()> {
-    let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
+    let normal = (b - a)
+        .cross(&(c - a))
+        .try_normalize(0.0)
+        .unwrap_or_default();
     let mut record = [0u8; RECORD];
-    for (slot, value) in record.chunks_exact_mut(4).zip([normal, a, b, c].iter().flat_map(|p| p.iter())) {
+    for (slot, value) in record
+        .chunks_exact_mut(4)
+        .zip([normal, a, b, c].iter().flat_map(|p| p.iter()))
+    {
         slot.copy_from_slice(&(*value as f32).to_le_bytes());
     }
     w.write_all(&record)

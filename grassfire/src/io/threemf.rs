@@ -55,7 +55,12 @@ impl Transform {
     fn then(&self, outer: &Self) -> Self {
         let row = |r: usize| Vec3::new(self.0[3 * r], self.0[3 * r + 1], self.0[3 * r + 2]);
         let origin = outer.apply(&Vec3::zeros());
-        let rows = [outer.apply(&row(0)) - origin, outer.apply(&row(1)) - origin, outer.apply(&row(2)) - origin, outer.apply(&row(3))];
+        let rows = [
+            outer.apply(&row(0)) - origin,
+            outer.apply(&row(1)) - origin,
+            outer.apply(&row(2)) - origin,
+            outer.apply(&row(3)),
+        ];
         let mut m = [0.0; 12];
         for (slot, value) in m.iter_mut().zip(rows.iter().flat_map(|r| r.iter())) {
             *slot = *value;
@@ -73,13 +78,22 @@ impl Transform {
 /// Reads all build items, each with its own tag.
 pub(super) fn read(src: &Source, notes: &mut Vec<Repair>) -> Result<TriMesh, IoError> {
     let package = read_package(src)?;
-    let mut out = Assembly { mesh: TriMesh::default(), placements: 0, skipped: 0 };
+    let mut out = Assembly {
+        mesh: TriMesh::default(),
+        placements: 0,
+        skipped: 0,
+    };
     for (item, (key, transform)) in package.build.iter().enumerate() {
         out.place(src, &package, key, transform, item as u32, 0)?;
     }
     if package.build.is_empty() {
         // No build section that names an object: every object with triangles is meant.
-        let keys: Vec<&Key> = package.objects.iter().filter(|(_, o)| !o.triangles.is_empty()).map(|(k, _)| k).collect();
+        let keys: Vec<&Key> = package
+            .objects
+            .iter()
+            .filter(|(_, o)| !o.triangles.is_empty())
+            .map(|(k, _)| k)
+            .collect();
         for (item, key) in keys.into_iter().enumerate() {
             out.place(src, &package, key, &Transform::IDENTITY, item as u32, 0)?;
         }
@@ -98,7 +112,15 @@ struct Assembly {
 }
 
 impl Assembly {
-    fn place(&mut self, src: &Source, package: &Package, key: &Key, transform: &Transform, tag: u32, depth: usize) -> Result<(), IoError> {
+    fn place(
+        &mut self,
+        src: &Source,
+        package: &Package,
+        key: &Key,
+        transform: &Transform,
+        tag: u32,
+        depth: usize,
+    ) -> Result<(), IoError> {
         self.placements += 1;
         if depth > MAX_DEPTH {
             return Err(src.limit("the nesting of components", depth, MAX_DEPTH));
@@ -108,7 +130,11 @@ impl Assembly {
         }
         src.monitor.check()?;
         let Some(object) = package.objects.get(key) else {
-            return Err(src.format(format!("object {} of part {} does not exist", key.1, quote(key.0.as_bytes()))));
+            return Err(src.format(format!(
+                "object {} of part {} does not exist",
+                key.1,
+                quote(key.0.as_bytes())
+            )));
         };
         if object.auxiliary {
             self.skipped += 1;
@@ -118,9 +144,18 @@ impl Assembly {
         src.check_triangles(self.mesh.triangles.len() + object.triangles.len())?;
         // A triangle has three corners: so many points cannot be in use, and the indices stay within 32 bits.
         if first + object.points.len() > (u32::MAX / 2) as usize {
-            return Err(src.limit("the number of points", first + object.points.len(), (u32::MAX / 2) as usize));
+            return Err(src.limit(
+                "the number of points",
+                first + object.points.len(),
+                (u32::MAX / 2) as usize,
+            ));
         }
-        self.mesh.points.extend(object.points.iter().map(|p| transform.apply(p) * object.unit));
+        self.mesh.points.extend(
+            object
+                .points
+                .iter()
+                .map(|p| transform.apply(p) * object.unit),
+        );
         let shift = first as u32;
         let mirrors = transform.mirrors();
         for &[a, b, c] in &object.triangles {
@@ -136,10 +171,19 @@ impl Assembly {
 }
 
 fn read_package(src: &Source) -> Result<Package, IoError> {
-    let bad_zip = |e: zip::result::ZipError| src.format(format!("not a valid zip archive: {}", quote(e.to_string().as_bytes())));
+    let bad_zip = |e: zip::result::ZipError| {
+        src.format(format!(
+            "not a valid zip archive: {}",
+            quote(e.to_string().as_bytes())
+        ))
+    };
     let mut archive = zip::ZipArchive::new(Cursor::new(src.bytes)).map_err(bad_zip)?;
     if archive.len() > MAX_FILES {
-        return Err(src.limit("the number of files in the archive", archive.len(), MAX_FILES));
+        return Err(src.limit(
+            "the number of files in the archive",
+            archive.len(),
+            MAX_FILES,
+        ));
     }
     let mut names: Vec<String> = archive
         .file_names()
@@ -150,7 +194,11 @@ fn read_package(src: &Source) -> Result<Package, IoError> {
     names.sort_unstable();
     if names.is_empty() {
         let found = "the archive holds no .model file".to_owned();
-        return Err(IoError::NotA { file: src.file(), expected: "a 3MF file", found });
+        return Err(IoError::NotA {
+            file: src.file(),
+            expected: "a 3MF file",
+            found,
+        });
     }
     let mut package = Package::default();
     let mut left = src.options.max_unpacked_bytes;
@@ -162,7 +210,12 @@ fn read_package(src: &Source) -> Result<Package, IoError> {
         left = limited.get_ref().limit();
         if left == 0 {
             let limit = src.options.max_unpacked_bytes;
-            return Err(IoError::Limit { file: src.file(), what: "the unpacked size in bytes".into(), value: limit, limit });
+            return Err(IoError::Limit {
+                file: src.file(),
+                what: "the unpacked size in bytes".into(),
+                value: limit,
+                limit,
+            });
         }
     }
     Ok(package)
@@ -177,9 +230,19 @@ struct Part<'a> {
     object: Option<(u64, Object)>,
 }
 
-fn read_model(src: &Source, name: &str, input: &mut dyn BufRead, package: &mut Package) -> Result<(), IoError> {
+fn read_model(
+    src: &Source,
+    name: &str,
+    input: &mut dyn BufRead,
+    package: &mut Package,
+) -> Result<(), IoError> {
     let mut reader = Reader::from_reader(input);
-    let mut part = Part { src, name, unit: 1.0, object: None };
+    let mut part = Part {
+        src,
+        name,
+        unit: 1.0,
+        object: None,
+    };
     let mut buffer = Vec::new();
     let mut events = 0usize;
     loop {
@@ -190,7 +253,13 @@ fn read_model(src: &Source, name: &str, input: &mut dyn BufRead, package: &mut P
         }
         let at = reader.buffer_position();
         let event = reader.read_event_into(&mut buffer);
-        let event = event.map_err(|e| src.format(format!("{}, byte {at}: {}", quote(name.as_bytes()), quote(e.to_string().as_bytes()))))?;
+        let event = event.map_err(|e| {
+            src.format(format!(
+                "{}, byte {at}: {}",
+                quote(name.as_bytes()),
+                quote(e.to_string().as_bytes())
+            ))
+        })?;
         match event {
             Event::Start(tag) => part.open(&tag, at, package)?,
             Event::Empty(tag) => {
@@ -206,32 +275,52 @@ fn read_model(src: &Source, name: &str, input: &mut dyn BufRead, package: &mut P
 
 impl Part<'_> {
     fn fail(&self, at: u64, what: impl std::fmt::Display) -> IoError {
-        self.src.format(format!("{}, byte {at}: {what}", quote(self.name.as_bytes())))
+        self.src.format(format!(
+            "{}, byte {at}: {what}",
+            quote(self.name.as_bytes())
+        ))
     }
 
     fn attribute(&self, tag: &BytesStart, key: &[u8]) -> Option<Vec<u8>> {
         // Damaged attributes count as missing; required ones are reported by name.
-        let found = tag.attributes().filter_map(Result::ok).find(|a| a.key.local_name().as_ref() == key)?;
+        let found = tag
+            .attributes()
+            .filter_map(Result::ok)
+            .find(|a| a.key.local_name().as_ref() == key)?;
         Some(found.value.into_owned())
     }
 
-    fn required<T: std::str::FromStr>(&self, tag: &BytesStart, at: u64, key: &str) -> Result<T, IoError> {
-        let value = self.attribute(tag, key.as_bytes()).ok_or_else(|| self.fail(at, format!("attribute `{key}` is missing")))?;
-        parse(value.trim_ascii()).ok_or_else(|| self.fail(at, format!("`{key}` is {}", quote(&value))))
+    fn required<T: std::str::FromStr>(
+        &self,
+        tag: &BytesStart,
+        at: u64,
+        key: &str,
+    ) -> Result<T, IoError> {
+        let value = self
+            .attribute(tag, key.as_bytes())
+            .ok_or_else(|| self.fail(at, format!("attribute `{key}` is missing")))?;
+        parse(value.trim_ascii())
+            .ok_or_else(|| self.fail(at, format!("`{key}` is {}", quote(&value))))
     }
 
     /// The object that a component or build item refers to, and how it is placed.
     fn reference(&self, tag: &BytesStart, at: u64) -> Result<(Key, Transform), IoError> {
         let id = self.required(tag, at, "objectid")?;
         let part = match self.attribute(tag, b"path") {
-            Some(path) => String::from_utf8_lossy(&path).trim_start_matches('/').to_owned(),
+            Some(path) => String::from_utf8_lossy(&path)
+                .trim_start_matches('/')
+                .to_owned(),
             None => self.name.to_owned(),
         };
         let transform = match self.attribute(tag, b"transform") {
             Some(text) => {
                 let values: Option<Vec<f64>> = tokens(&text).map(parse).collect();
-                let matrix = values.and_then(|v| <[f64; 12]>::try_from(v).ok()).filter(|m| m.iter().all(|x| x.is_finite()));
-                Transform(matrix.ok_or_else(|| self.fail(at, format!("transform {} is not 12 numbers", quote(&text))))?)
+                let matrix = values
+                    .and_then(|v| <[f64; 12]>::try_from(v).ok())
+                    .filter(|m| m.iter().all(|x| x.is_finite()));
+                Transform(matrix.ok_or_else(|| {
+                    self.fail(at, format!("transform {} is not 12 numbers", quote(&text)))
+                })?)
             }
             None => Transform::IDENTITY,
         };
@@ -248,16 +337,32 @@ impl Part<'_> {
                     Some(b"inch") => 25.4,
                     Some(b"foot") => 304.8,
                     Some(b"meter") => 1000.0,
-                    Some(other) => return Err(self.fail(at, format!("unit {} is not known", quote(other)))),
+                    Some(other) => {
+                        return Err(self.fail(at, format!("unit {} is not known", quote(other))));
+                    }
                 };
             }
             b"object" => {
                 let id = self.required(tag, at, "id")?;
-                let auxiliary = matches!(self.attribute(tag, b"type").as_deref(), Some(b"support" | b"other"));
-                self.object = Some((id, Object { auxiliary, unit: self.unit, ..Object::default() }));
+                let auxiliary = matches!(
+                    self.attribute(tag, b"type").as_deref(),
+                    Some(b"support" | b"other")
+                );
+                self.object = Some((
+                    id,
+                    Object {
+                        auxiliary,
+                        unit: self.unit,
+                        ..Object::default()
+                    },
+                ));
             }
             b"vertex" => {
-                let p = Vec3::new(self.required(tag, at, "x")?, self.required(tag, at, "y")?, self.required(tag, at, "z")?);
+                let p = Vec3::new(
+                    self.required(tag, at, "x")?,
+                    self.required(tag, at, "y")?,
+                    self.required(tag, at, "z")?,
+                );
                 if let Some((_, object)) = &mut self.object {
                     object.points.push(p);
                 }
@@ -275,14 +380,28 @@ impl Part<'_> {
         Ok(())
     }
 
-    fn triangle(&mut self, tag: &BytesStart, at: u64, package: &mut Package) -> Result<(), IoError> {
-        let corners: [u32; 3] = [self.required(tag, at, "v1")?, self.required(tag, at, "v2")?, self.required(tag, at, "v3")?];
+    fn triangle(
+        &mut self,
+        tag: &BytesStart,
+        at: u64,
+        package: &mut Package,
+    ) -> Result<(), IoError> {
+        let corners: [u32; 3] = [
+            self.required(tag, at, "v1")?,
+            self.required(tag, at, "v2")?,
+            self.required(tag, at, "v3")?,
+        ];
         package.triangles += 1;
         self.src.check_triangles(package.triangles)?;
-        let Some((id, object)) = &mut self.object else { return Ok(()) };
+        let Some((id, object)) = &mut self.object else {
+            return Ok(());
+        };
         let count = object.points.len();
         if let Some(corner) = corners.iter().find(|&&c| c as usize >= count) {
-            let what = format!("triangle {} of object {id} names point {corner}, there are {count}", object.triangles.len());
+            let what = format!(
+                "triangle {} of object {id} names point {corner}, there are {count}",
+                object.triangles.len()
+            );
             return Err(self.fail(at, what));
         }
         object.triangles.push(corners);
@@ -292,9 +411,15 @@ impl Part<'_> {
     fn close(&mut self, tag: &[u8], package: &mut Package) -> Result<(), IoError> {
         if tag == b"object"
             && let Some((id, object)) = self.object.take()
-            && package.objects.insert((self.name.to_owned(), id), object).is_some()
+            && package
+                .objects
+                .insert((self.name.to_owned(), id), object)
+                .is_some()
         {
-            return Err(self.src.format(format!("object {id} is defined twice in {}", quote(self.name.as_bytes()))));
+            return Err(self.src.format(format!(
+                "object {id} is defined twice in {}",
+                quote(self.name.as_bytes())
+            )));
         }
         Ok(())
     }

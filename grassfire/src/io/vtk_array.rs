@@ -28,10 +28,18 @@ pub(super) struct Appended<'a> {
 impl<'a> Appended<'a> {
     /// `rest` begins with the tag; the data begin behind the first underscore.
     pub fn find(rest: &'a [u8]) -> Self {
-        let Some(end) = rest.iter().position(|&b| b == b'>') else { return Self::default() };
+        let Some(end) = rest.iter().position(|&b| b == b'>') else {
+            return Self::default();
+        };
         let (tag, body) = rest.split_at(end + 1);
-        let start = body.iter().position(|&b| b == b'_').map_or(body.len(), |at| at + 1);
-        Self { bytes: &body[start..], base64: find(tag, b"base64").is_some() }
+        let start = body
+            .iter()
+            .position(|&b| b == b'_')
+            .map_or(body.len(), |at| at + 1);
+        Self {
+            bytes: &body[start..],
+            base64: find(tag, b"base64").is_some(),
+        }
     }
 }
 
@@ -51,8 +59,14 @@ pub(super) struct Array<'a> {
 
 impl Array<'_> {
     /// All values; text by its words, binary data by their type.
-    pub fn decode(&self, src: &Source, encoding: &Encoding, appended: &Appended) -> Result<Vec<f64>, IoError> {
-        let fail = |what: String| src.format(format!("array {}: {what}", quote(self.name.as_bytes())));
+    pub fn decode(
+        &self,
+        src: &Source,
+        encoding: &Encoding,
+        appended: &Appended,
+    ) -> Result<Vec<f64>, IoError> {
+        let fail =
+            |what: String| src.format(format!("array {}: {what}", quote(self.name.as_bytes())));
         let bytes = match self.format.as_str() {
             "ascii" => return self.decode_text().map_err(fail),
             "binary" => self.unpack(src, encoding, Coded::new(&self.text, true)),
@@ -67,12 +81,19 @@ impl Array<'_> {
     }
 
     fn decode_text(&self) -> Result<Vec<f64>, String> {
-        let number = |word: &[u8]| super::source::parse(word).ok_or_else(|| format!("{} is not a number", quote(word)));
+        let number = |word: &[u8]| {
+            super::source::parse(word).ok_or_else(|| format!("{} is not a number", quote(word)))
+        };
         tokens(&self.text).map(number).collect()
     }
 
     /// The plain bytes.
-    fn unpack(&self, src: &Source, encoding: &Encoding, mut coded: Coded) -> Result<Vec<u8>, String> {
+    fn unpack(
+        &self,
+        src: &Source,
+        encoding: &Encoding,
+        mut coded: Coded,
+    ) -> Result<Vec<u8>, String> {
         let width = if encoding.wide { 8 } else { 4 };
         let word = |bytes: &[u8]| {
             let mut raw = [0u8; 8];
@@ -94,16 +115,29 @@ impl Array<'_> {
                 if blocks == 0 {
                     return Ok(Vec::new());
                 }
-                let header = blocks.checked_add(3).and_then(|n| n.checked_mul(width)).and_then(|n| coded.take(n)).ok_or_else(cut)?;
+                let header = blocks
+                    .checked_add(3)
+                    .and_then(|n| n.checked_mul(width))
+                    .and_then(|n| coded.take(n))
+                    .ok_or_else(cut)?;
                 let size = word(&counts[width..2 * width]);
                 if size.checked_mul(blocks).is_none_or(|n| n > limit) {
-                    return Err(format!("{blocks} blocks of {size} bytes are more than the limit of {limit} bytes"));
+                    return Err(format!(
+                        "{blocks} blocks of {size} bytes are more than the limit of {limit} bytes"
+                    ));
                 }
-                let packed: Vec<usize> = header[3 * width..].chunks_exact(width).map(word).collect();
-                let total = packed.iter().try_fold(0usize, |n, &p| n.checked_add(p)).ok_or_else(cut)?;
+                let packed: Vec<usize> =
+                    header[3 * width..].chunks_exact(width).map(word).collect();
+                let total = packed
+                    .iter()
+                    .try_fold(0usize, |n, &p| n.checked_add(p))
+                    .ok_or_else(cut)?;
                 inflate(&coded.take(total).ok_or_else(cut)?, &packed, size)
             }
-            Some(other) => Err(format!("compressor {} cannot be read, save with zlib or none", quote(other.as_bytes()))),
+            Some(other) => Err(format!(
+                "compressor {} cannot be read, save with zlib or none",
+                quote(other.as_bytes())
+            )),
         }
     }
 
@@ -115,7 +149,11 @@ impl Array<'_> {
                     .map(|b| {
                         let mut raw = [0u8; size_of::<$kind>()];
                         raw.copy_from_slice(b);
-                        (if big { <$kind>::from_be_bytes(raw) } else { <$kind>::from_le_bytes(raw) }) as f64
+                        (if big {
+                            <$kind>::from_be_bytes(raw)
+                        } else {
+                            <$kind>::from_le_bytes(raw)
+                        }) as f64
                     })
                     .collect()
             };
@@ -142,10 +180,15 @@ fn inflate(data: &[u8], packed: &[usize], size: usize) -> Result<Vec<u8>, String
     let mut at = 0;
     for (block, &length) in packed.iter().enumerate() {
         let start = out.len();
-        let mut decoder = flate2::read::ZlibDecoder::new(&data[at..at + length]).take(size as u64 + 1);
-        decoder.read_to_end(&mut out).map_err(|e| format!("compressed block {block} is damaged: {e}"))?;
+        let mut decoder =
+            flate2::read::ZlibDecoder::new(&data[at..at + length]).take(size as u64 + 1);
+        decoder
+            .read_to_end(&mut out)
+            .map_err(|e| format!("compressed block {block} is damaged: {e}"))?;
         if out.len() - start > size {
-            return Err(format!("compressed block {block} holds more than the {size} bytes it claims"));
+            return Err(format!(
+                "compressed block {block} holds more than the {size} bytes it claims"
+            ));
         }
         at += length;
     }
@@ -182,7 +225,11 @@ impl<'a> Coded<'a> {
 
     /// `count` bytes without moving on.
     fn peek(&self, count: usize) -> Option<Vec<u8>> {
-        Coded { data: self.data, base64: self.base64 }.take(count)
+        Coded {
+            data: self.data,
+            base64: self.base64,
+        }
+        .take(count)
     }
 
     /// `count` bytes that were encoded as one stream.
@@ -221,6 +268,10 @@ impl<'a> Coded<'a> {
 }
 
 fn decode(text: &[u8]) -> Option<Vec<u8>> {
-    let config = GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent).with_decode_allow_trailing_bits(true);
-    GeneralPurpose::new(&base64::alphabet::STANDARD, config).decode(text).ok()
+    let config = GeneralPurposeConfig::new()
+        .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+        .with_decode_allow_trailing_bits(true);
+    GeneralPurpose::new(&base64::alphabet::STANDARD, config)
+        .decode(text)
+        .ok()
 }

@@ -13,7 +13,11 @@ const HEXAHEDRON: f64 = 12.0;
 const REGULAR: f64 = 1e-2;
 
 /// Puts cell or point values onto a regular grid; boxes that are missing are empty (0).
-pub(super) fn read(src: &Source, file: &VtkFile, notes: &mut Vec<Repair>) -> Result<VoxelGrid<f32>, IoError> {
+pub(super) fn read(
+    src: &Source,
+    file: &VtkFile,
+    notes: &mut Vec<Repair>,
+) -> Result<VoxelGrid<f32>, IoError> {
     let (section, name) = file.choose(src)?;
     let mut boxes = Boxes::default();
     let mut values = Vec::new();
@@ -24,15 +28,26 @@ pub(super) fn read(src: &Source, file: &VtkFile, notes: &mut Vec<Repair>) -> Res
         let first = boxes.centres.len();
         add_boxes(src, file, piece, &points, &mut boxes)?;
         let data = file.values(src, piece, &section, Some(&name))?;
-        let at = if section == "CellData" { boxes.centres[first..].to_vec() } else { points };
+        let at = if section == "CellData" {
+            boxes.centres[first..].to_vec()
+        } else {
+            points
+        };
         if data.len() != at.len() {
-            return Err(src.format(format!("array {name:?} has {} values for {} places", data.len(), at.len())));
+            return Err(src.format(format!(
+                "array {name:?} has {} values for {} places",
+                data.len(),
+                at.len()
+            )));
         }
         places.extend(at);
         values.extend(data);
     }
     if boxes.centres.is_empty() {
-        return Err(IoError::Empty { file: src.file(), what: "no cells" });
+        return Err(IoError::Empty {
+            file: src.file(),
+            what: "no cells",
+        });
     }
     scatter(src, &places, &values, boxes.size, notes)
 }
@@ -52,20 +67,41 @@ fn points(src: &Source, file: &VtkFile, piece: &Piece) -> Result<Vec<Vec3>, IoEr
     }
 }
 
-fn add_boxes(src: &Source, file: &VtkFile, piece: &Piece, points: &[Vec3], boxes: &mut Boxes) -> Result<(), IoError> {
+fn add_boxes(
+    src: &Source,
+    file: &VtkFile,
+    piece: &Piece,
+    points: &[Vec3],
+    boxes: &mut Boxes,
+) -> Result<(), IoError> {
     let corners = file.values(src, piece, "Cells", Some("connectivity"))?;
     let ends = file.values(src, piece, "Cells", Some("offsets"))?;
     let types = file.values(src, piece, "Cells", Some("types"))?;
     if types.len() != ends.len() {
-        return Err(src.format(format!("{} cell types for {} cells", types.len(), ends.len())));
+        return Err(src.format(format!(
+            "{} cell types for {} cells",
+            types.len(),
+            ends.len()
+        )));
     }
     let mut start = 0.0;
     for (index, (&end, &kind)) in ends.iter().zip(&types).enumerate() {
         if kind != HEXAHEDRON && kind != VOXEL {
-            return Err(src.element("cell", index, format!("has VTK type {kind}; only hexahedra (12) and voxels (11) make a grid")));
+            return Err(src.element(
+                "cell",
+                index,
+                format!("has VTK type {kind}; only hexahedra (12) and voxels (11) make a grid"),
+            ));
         }
         if end - start != 8.0 || end > corners.len() as f64 {
-            return Err(src.element("cell", index, format!("runs from corner {start} to {end}, 8 of {} wanted", corners.len())));
+            return Err(src.element(
+                "cell",
+                index,
+                format!(
+                    "runs from corner {start} to {end}, 8 of {} wanted",
+                    corners.len()
+                ),
+            ));
         }
         let (lower, upper) = cell_box(src, index, &corners[start as usize..end as usize], points)?;
         let size = upper - lower;
@@ -73,7 +109,10 @@ fn add_boxes(src: &Source, file: &VtkFile, piece: &Piece, points: &[Vec3], boxes
             boxes.size = size;
         }
         if (size - boxes.size).amax() > REGULAR * boxes.size.amin() || boxes.size.amin() <= 0.0 {
-            let what = format!("is {} x {} x {}, the first cell {} x {} x {}: a grid needs equal boxes", size.x, size.y, size.z, boxes.size.x, boxes.size.y, boxes.size.z);
+            let what = format!(
+                "is {} x {} x {}, the first cell {} x {} x {}: a grid needs equal boxes",
+                size.x, size.y, size.z, boxes.size.x, boxes.size.y, boxes.size.z
+            );
             return Err(src.element("cell", index, what));
         }
         boxes.centres.push((lower + upper) / 2.0);
@@ -83,13 +122,22 @@ fn add_boxes(src: &Source, file: &VtkFile, piece: &Piece, points: &[Vec3], boxes
 }
 
 /// The box of one cell; every corner must be a corner of the box.
-fn cell_box(src: &Source, index: usize, corners: &[f64], points: &[Vec3]) -> Result<(Vec3, Vec3), IoError> {
+fn cell_box(
+    src: &Source,
+    index: usize,
+    corners: &[f64],
+    points: &[Vec3],
+) -> Result<(Vec3, Vec3), IoError> {
     let mut lower = Vec3::repeat(f64::INFINITY);
     let mut upper = Vec3::repeat(f64::NEG_INFINITY);
     let mut places = [Vec3::zeros(); 8];
     for (place, &corner) in places.iter_mut().zip(corners) {
         if !(corner >= 0.0 && corner < points.len() as f64) {
-            return Err(src.element("cell", index, format!("names point {corner}, there are {}", points.len())));
+            return Err(src.element(
+                "cell",
+                index,
+                format!("names point {corner}, there are {}", points.len()),
+            ));
         }
         *place = points[corner as usize];
         lower = lower.inf(place);
@@ -103,9 +151,19 @@ fn cell_box(src: &Source, index: usize, corners: &[f64], points: &[Vec3]) -> Res
     Ok((lower, upper))
 }
 
-fn scatter(src: &Source, places: &[Vec3], values: &[f64], size: Vec3, notes: &mut Vec<Repair>) -> Result<VoxelGrid<f32>, IoError> {
-    let lower = places.iter().fold(Vec3::repeat(f64::INFINITY), |lo, p| lo.inf(p));
-    let upper = places.iter().fold(Vec3::repeat(f64::NEG_INFINITY), |hi, p| hi.sup(p));
+fn scatter(
+    src: &Source,
+    places: &[Vec3],
+    values: &[f64],
+    size: Vec3,
+    notes: &mut Vec<Repair>,
+) -> Result<VoxelGrid<f32>, IoError> {
+    let lower = places
+        .iter()
+        .fold(Vec3::repeat(f64::INFINITY), |lo, p| lo.inf(p));
+    let upper = places
+        .iter()
+        .fold(Vec3::repeat(f64::NEG_INFINITY), |hi, p| hi.sup(p));
     let dims = [0, 1, 2].map(|a| ((upper[a] - lower[a]) / size[a]).round() as usize);
     let dims = dims.map(|n| n.saturating_add(1));
     let count = src.check_voxels(dims)?;
@@ -116,7 +174,11 @@ fn scatter(src: &Source, places: &[Vec3], values: &[f64], size: Vec3, notes: &mu
         let at = (p - lower).component_div(&size);
         let cell = at.map(f64::round);
         if (at - cell).amax() > 0.1 {
-            return Err(src.element("cell", index, "does not lie on the regular grid of the others"));
+            return Err(src.element(
+                "cell",
+                index,
+                "does not lie on the regular grid of the others",
+            ));
         }
         let [i, j, k] = [cell.x as usize, cell.y as usize, cell.z as usize];
         let slot = (k * dims[1] + j) * dims[0] + i;
@@ -124,12 +186,22 @@ fn scatter(src: &Source, places: &[Vec3], values: &[f64], size: Vec3, notes: &mu
         grid[slot] = value as f32;
     }
     if filled < count {
-        let text = format!("{} of {count} voxels of the surrounding box are not in the file and are empty", count - filled);
+        let text = format!(
+            "{} of {count} voxels of the surrounding box are not in the file and are empty",
+            count - filled
+        );
         notes.push(Repair::new(RepairKind::Assumed, count - filled, text));
     }
     if filled < places.len() {
-        let text = format!("{} cells lie in the same place as another", places.len() - filled);
-        notes.push(Repair::new(RepairKind::DuplicateFaces, places.len() - filled, text));
+        let text = format!(
+            "{} cells lie in the same place as another",
+            places.len() - filled
+        );
+        notes.push(Repair::new(
+            RepairKind::DuplicateFaces,
+            places.len() - filled,
+            text,
+        ));
     }
     density::cubic(src, lower, [size.x, size.y, size.z], dims, grid, notes)
 }

@@ -12,6 +12,7 @@ pub use distance::{Distance, DistanceOptions, DistanceSummary, two_sided};
 pub use repair::{
     Repair, RepairError, RepairKind, RepairOptions, RepairReport, Repaired, repair,
 };
+pub use repair::{Repair, RepairError, RepairKind, RepairOptions, RepairReport, Repaired, repair};
 pub use solid::{Solid, SolidError};
 pub use winding::Winding;
 
@@ -37,7 +38,9 @@ impl TriMesh {
 
     /// Signed volume (positive when oriented outward), mm3. Summed about the first point to keep precision.
     pub fn volume(&self) -> f64 {
-        let Some(base) = self.points.first() else { return 0.0 };
+        let Some(base) = self.points.first() else {
+            return 0.0;
+        };
         (0..self.triangles.len())
             .map(|t| {
                 let [a, b, c] = self.corners(t);
@@ -59,6 +62,10 @@ impl TriMesh {
     /// Lower and upper corner of the box around all points; `None` without points.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         let first = *self.points.first()?;
-        Some(self.points.iter().fold((first, first), |(lo, hi), p| (lo.inf(p), hi.sup(p))))
+        Some(
+            self.points
+                .iter()
+                .fold((first, first), |(lo, hi), p| (lo.inf(p), hi.sup(p))),
+        )
     }
 }

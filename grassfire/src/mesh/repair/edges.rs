@@ -32,7 +32,11 @@ impl Edges {
             }
         }
         keyed.par_sort_unstable();
-        let mut edges = Self { starts: Vec::new(), halves: Vec::with_capacity(keyed.len()), of_half: vec![0; keyed.len()] };
+        let mut edges = Self {
+            starts: Vec::new(),
+            halves: Vec::with_capacity(keyed.len()),
+            of_half: vec![0; keyed.len()],
+        };
         let mut last = None;
         for (key, half) in keyed {
             if last != Some(key) {
@@ -85,7 +89,10 @@ impl Edges {
         let mut parent: Vec<u32> = (0..faces as u32).collect();
         for halves in self.iter().filter(|h| joins(h)) {
             for pair in halves.windows(2) {
-                let (a, b) = (root(&mut parent, pair[0] / 3), root(&mut parent, pair[1] / 3));
+                let (a, b) = (
+                    root(&mut parent, pair[0] / 3),
+                    root(&mut parent, pair[1] / 3),
+                );
                 parent[a.max(b) as usize] = a.min(b);
             }
         }
@@ -101,7 +108,10 @@ impl Edges {
                 of_face[face] = of_face[top];
             }
         }
-        Components { of_face, count: count as usize }
+        Components {
+            of_face,
+            count: count as usize,
+        }
     }
 }
 

@@ -16,18 +16,33 @@ const PASSES: usize = 10;
 /// wall between two bodies), one otherwise (a turned copy).
 pub(super) fn drop_duplicates(mesh: &mut TriMesh, repairs: &mut Vec<Repair>) {
     let mut keep = vec![true; mesh.triangles.len()];
-    let mut keyed: Vec<([u32; 3], bool, u32)> = mesh.triangles.par_iter().enumerate().map(|(i, t)| canonical(t, i)).collect();
+    let mut keyed: Vec<([u32; 3], bool, u32)> = mesh
+        .triangles
+        .par_iter()
+        .enumerate()
+        .map(|(i, t)| canonical(t, i))
+        .collect();
     keyed.par_sort_unstable();
     let mut copies = 0;
-    for pair in keyed.windows(2).filter(|p| (p[0].0, p[0].1) == (p[1].0, p[1].1)) {
+    for pair in keyed
+        .windows(2)
+        .filter(|p| (p[0].0, p[0].1) == (p[1].0, p[1].1))
+    {
         keep[pair[1].2 as usize] = false;
         copies += 1;
     }
     retain(mesh, &keep);
     let opposite = drop_opposite(mesh);
     if copies + opposite > 0 {
-        let text = format!("{} double faces dropped ({copies} copies, {opposite} back to back)", copies + opposite);
-        repairs.push(Repair::new(RepairKind::DuplicateFaces, copies + opposite, text));
+        let text = format!(
+            "{} double faces dropped ({copies} copies, {opposite} back to back)",
+            copies + opposite
+        );
+        repairs.push(Repair::new(
+            RepairKind::DuplicateFaces,
+            copies + opposite,
+            text,
+        ));
     }
 }
 
@@ -40,7 +55,12 @@ fn canonical(t: &[u32; 3], index: usize) -> ([u32; 3], bool, u32) {
 }
 
 fn drop_opposite(mesh: &mut TriMesh) -> usize {
-    let mut keyed: Vec<_> = mesh.triangles.par_iter().enumerate().map(|(i, t)| canonical(t, i)).collect();
+    let mut keyed: Vec<_> = mesh
+        .triangles
+        .par_iter()
+        .enumerate()
+        .map(|(i, t)| canonical(t, i))
+        .collect();
     keyed.par_sort_unstable();
     if !keyed.windows(2).any(|p| p[0].0 == p[1].0) {
         return 0;
@@ -59,19 +79,34 @@ fn drop_opposite(mesh: &mut TriMesh) -> usize {
 }
 
 /// Drops faces with repeated corners, and flat faces unless all their sides have two faces (those hold the surface together and do no harm).
-pub(super) fn drop_degenerate(mesh: &mut TriMesh, repairs: &mut Vec<Repair>, monitor: &Monitor) -> Result<(), RepairError> {
+pub(super) fn drop_degenerate(
+    mesh: &mut TriMesh,
+    repairs: &mut Vec<Repair>,
+    monitor: &Monitor,
+) -> Result<(), RepairError> {
     let before = mesh.triangles.len();
-    let keep: Vec<bool> = mesh.triangles.iter().map(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]).collect();
+    let keep: Vec<bool> = mesh
+        .triangles
+        .iter()
+        .map(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0])
+        .collect();
     retain(mesh, &keep);
     for _ in 0..PASSES {
         monitor.check()?;
-        let flat: Vec<bool> = (0..mesh.triangles.len()).into_par_iter().map(|t| is_flat(mesh, t)).collect();
+        let flat: Vec<bool> = (0..mesh.triangles.len())
+            .into_par_iter()
+            .map(|t| is_flat(mesh, t))
+            .collect();
         if !flat.contains(&true) {
             break;
         }
         let edges = Edges::new(mesh);
         let sound = |t: usize| (0..3).all(|k| edges.around(t, k).len() == 2);
-        let keep: Vec<bool> = flat.iter().enumerate().map(|(t, flat)| !flat || sound(t)).collect();
+        let keep: Vec<bool> = flat
+            .iter()
+            .enumerate()
+            .map(|(t, flat)| !flat || sound(t))
+            .collect();
         if !keep.contains(&false) {
             break;
         }
@@ -87,7 +122,10 @@ pub(super) fn drop_degenerate(mesh: &mut TriMesh, repairs: &mut Vec<Repair>, mon
 
 fn is_flat(mesh: &TriMesh, t: usize) -> bool {
     let [a, b, c] = mesh.corners(t);
-    let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
+    let longest = (b - a)
+        .norm_squared()
+        .max((c - b).norm_squared())
+        .max((a - c).norm_squared());
     (b - a).cross(&(c - a)).norm() <= FLAT * longest
 }
 
@@ -113,13 +151,20 @@ pub(super) fn drop_fins(mesh: &mut TriMesh, options: &RepairOptions, repairs: &m
                 shared[patch] |= halves.len() > 2;
             }
         }
-        let fin: Vec<bool> = (0..patches.count).map(|p| open[p] && shared[p] && areas[p] < options.max_fin_share * total).collect();
+        let fin: Vec<bool> = (0..patches.count)
+            .map(|p| open[p] && shared[p] && areas[p] < options.max_fin_share * total)
+            .collect();
         if !fin.contains(&true) {
             break;
         }
         let keep: Vec<bool> = patches.of_face.iter().map(|&p| !fin[p as usize]).collect();
         count += keep.iter().filter(|k| !**k).count();
-        area += areas.iter().zip(&fin).filter(|(_, fin)| **fin).map(|(a, _)| a).sum::<f64>();
+        area += areas
+            .iter()
+            .zip(&fin)
+            .filter(|(_, fin)| **fin)
+            .map(|(a, _)| a)
+            .sum::<f64>();
         retain(mesh, &keep);
     }
     if count > 0 {

@@ -16,7 +16,12 @@ const MAX_EXACT: usize = 100;
 /// Fills holes whose border is a simple loop; refuses a surface that is mostly holes.
 ///
 /// Loops up to 100 edges get the triangulation of least area (Barequet and Sharir 1995), longer ones are cut ear by ear, sharpest first.
-pub(super) fn fill(mesh: &mut TriMesh, options: &RepairOptions, repairs: &mut Vec<Repair>, monitor: &Monitor) -> Result<(), RepairError> {
+pub(super) fn fill(
+    mesh: &mut TriMesh,
+    options: &RepairOptions,
+    repairs: &mut Vec<Repair>,
+    monitor: &Monitor,
+) -> Result<(), RepairError> {
     let edges = Edges::new(mesh);
     if edges.open() == 0 {
         return Ok(());
@@ -28,12 +33,17 @@ pub(super) fn fill(mesh: &mut TriMesh, options: &RepairOptions, repairs: &mut Ve
     for cycle in &loops {
         monitor.check()?;
         let points: Vec<Vec3> = cycle.iter().map(|&v| mesh.points[v as usize]).collect();
-        let triangles = if cycle.len() <= MAX_EXACT { least_area(&points) } else { clip_ears(&points) };
+        let triangles = if cycle.len() <= MAX_EXACT {
+            least_area(&points)
+        } else {
+            clip_ears(&points)
+        };
         let patch: f64 = triangles.iter().map(|t| area_of(&points, t)).sum();
         area += patch;
         if patch > largest {
             largest = patch;
-            place = points.iter().map(|p| p - points[0]).sum::<Vec3>() / points.len() as f64 + points[0];
+            place = points.iter().map(|p| p - points[0]).sum::<Vec3>() / points.len() as f64
+                + points[0];
         }
         patches.extend(triangles.into_iter().map(|t| t.map(|k| cycle[k as usize])));
     }
@@ -81,7 +91,9 @@ fn least_area(points: &[Vec3]) -> Vec<[u32; 3]> {
             let k = i + span;
             let mut best = f64::INFINITY;
             for j in i + 1..k {
-                let sum = cost[i * n + j] + cost[j * n + k] + area_of(points, &[i as u32, j as u32, k as u32]);
+                let sum = cost[i * n + j]
+                    + cost[j * n + k]
+                    + area_of(points, &[i as u32, j as u32, k as u32]);
                 if sum < best {
                     best = sum;
                     apex[i * n + k] = j as u32;
@@ -116,7 +128,12 @@ fn clip_ears(points: &[Vec3]) -> Vec<[u32; 3]> {
         let (u, v) = (points[c] - points[b], points[a] - points[b]);
         let turn = u.cross(&v).dot(&normal).atan2(u.dot(&v) * normal.norm());
         // Reflex corners come last. The angle is positive now, so its bits sort like the number.
-        (if turn < 0.0 { turn + std::f64::consts::TAU } else { turn }).to_bits()
+        (if turn < 0.0 {
+            turn + std::f64::consts::TAU
+        } else {
+            turn
+        })
+        .to_bits()
     };
     for b in 0..n {
         heap.push(Reverse((angle(previous[b], b, next[b]), b, 0)));
@@ -135,7 +152,11 @@ fn clip_ears(points: &[Vec3]) -> Vec<[u32; 3]> {
         stamp[b] = u32::MAX;
         for corner in [a, c] {
             stamp[corner] += 1;
-            heap.push(Reverse((angle(previous[corner], corner, next[corner]), corner, stamp[corner])));
+            heap.push(Reverse((
+                angle(previous[corner], corner, next[corner]),
+                corner,
+                stamp[corner],
+            )));
         }
     }
     triangles
@@ -144,5 +165,8 @@ fn clip_ears(points: &[Vec3]) -> Vec<[u32; 3]> {
 /// Normal of a polygon in space, twice its area long.
 fn newell(points: &[Vec3]) -> Vec3 {
     let base = points[0];
-    points.windows(2).map(|pair| (pair[0] - base).cross(&(pair[1] - base))).sum()
+    points
+        .windows(2)
+        .map(|pair| (pair[0] - base).cross(&(pair[1] - base)))
+        .sum()
 }

@@ -36,7 +36,9 @@ pub(super) fn boundary_loops(mesh: &TriMesh, edges: &Edges) -> Vec<Vec<u32>> {
             while *next < arrows.len() && arrows[*next].0 == at && used[*next] {
                 *next += 1;
             }
-            let Some(&(_, end)) = arrows.get(*next).filter(|a| a.0 == at) else { break };
+            let Some(&(_, end)) = arrows.get(*next).filter(|a| a.0 == at) else {
+                break;
+            };
             used[*next] = true;
             let seen = place[end as usize];
             if seen == u32::MAX {

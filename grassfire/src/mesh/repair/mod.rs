@@ -3,11 +3,14 @@
 mod edges;
 mod faces;
 mod holes;
+mod intersections;
 mod loops;
 mod orient;
 mod rays;
 mod report;
 mod shells;
+#[cfg(test)]
+mod tests;
 mod weld;
 
 use rayon::prelude::*;
@@ -77,11 +80,21 @@ impl Default for RepairOptions {
 ///
 /// # Errors
 /// [`RepairError`]: nothing usable, a sheet without volume, mostly holes, too large, too coarse, or any repair when `strict`.
-pub fn repair(mesh: TriMesh, options: &RepairOptions, monitor: &Monitor) -> Result<Repaired, RepairError> {
+pub fn repair(
+    mesh: TriMesh,
+    options: &RepairOptions,
+    monitor: &Monitor,
+) -> Result<Repaired, RepairError> {
     let step = |what: &str, done: f64| monitor.step("input", what, done);
-    let mut report = RepairReport { triangles: mesh.triangles.len(), ..RepairReport::default() };
+    let mut report = RepairReport {
+        triangles: mesh.triangles.len(),
+        ..RepairReport::default()
+    };
     if mesh.triangles.len() > MAX_TRIANGLES || mesh.points.len() > u32::MAX as usize {
-        return Err(RepairError::TooMany { triangles: mesh.triangles.len(), limit: MAX_TRIANGLES });
+        return Err(RepairError::TooMany {
+            triangles: mesh.triangles.len(),
+            limit: MAX_TRIANGLES,
+        });
     }
     step("checking", 0.0)?;
     let mut mesh = mesh;
@@ -105,7 +118,11 @@ pub fn repair(mesh: TriMesh, options: &RepairOptions, monitor: &Monitor) -> Resu
     faces::drop_fins(&mut mesh, options, &mut report.repairs);
     if mesh.triangles.is_empty() {
         let why = "no area";
-        return Err(RepairError::Empty { triangles: report.triangles, dropped: report.triangles, why });
+        return Err(RepairError::Empty {
+            triangles: report.triangles,
+            dropped: report.triangles,
+            why,
+        });
     }
 
     step("orienting", 0.5)?;
@@ -118,23 +135,51 @@ pub fn repair(mesh: TriMesh, options: &RepairOptions, monitor: &Monitor) -> Resu
 }
 
 /// Last checks on the mended mesh.
-fn finish(mut mesh: TriMesh, mut report: RepairReport, options: &RepairOptions, monitor: &Monitor) -> Result<Repaired, RepairError> {
+fn finish(
+    mut mesh: TriMesh,
+    mut report: RepairReport,
+    options: &RepairOptions,
+    monitor: &Monitor,
+) -> Result<Repaired, RepairError> {
     let edges = Edges::new(&mesh);
     if edges.open() > 0 {
-        let text = format!("{} open edges left: inside and outside are told by the winding number there", edges.open());
-        report.repairs.push(Repair::new(RepairKind::LeftOpen, edges.open(), text));
+        let text = format!(
+            "{} open edges left: inside and outside are told by the winding number there",
+            edges.open()
+        );
+        report
+            .repairs
+            .push(Repair::new(RepairKind::LeftOpen, edges.open(), text));
     }
     if edges.non_manifold() > 0 {
-        let text = format!("{} edges with more than two faces left to the remesh", edges.non_manifold());
-        report.repairs.push(Repair::new(RepairKind::NonManifold, edges.non_manifold(), text));
+        let text = format!(
+            "{} edges with more than two faces left to the remesh",
+            edges.non_manifold()
+        );
+        report.repairs.push(Repair::new(
+            RepairKind::NonManifold,
+            edges.non_manifold(),
+            text,
+        ));
     }
     drop_unused_points(&mut mesh);
+    monitor.step("input", "looking for faces that cross", 0.9)?;
+    let crossing = intersections::intersecting_faces(&mesh);
+    if crossing > 0 {
+        let text = format!("{crossing} faces run through others: the winding number decides there");
+        report
+            .repairs
+            .push(Repair::new(RepairKind::SelfIntersection, crossing, text));
+    }
     report.volume = mesh.volume();
     let area = mesh.area();
     check_volume(report.volume, area)?;
     let changes = report.repairs.iter().filter(|r| r.kind.changes_mesh());
     if let (true, Some(first)) = (options.strict, changes.clone().next()) {
-        return Err(RepairError::Strict { count: changes.count(), first: first.text.clone() });
+        return Err(RepairError::Strict {
+            count: changes.count(),
+            first: first.text.clone(),
+        });
     }
     for repair in report.repairs.iter().filter(|r| r.kind.is_warning()) {
         monitor.warn("input", repair.text.clone());
@@ -148,7 +193,9 @@ fn check_volume(volume: f64, area: f64) -> Result<(), RepairError> {
     if volume > LIMIT * area * area.sqrt() {
         return Ok(());
     }
-    Err(RepairError::NotASolid { why: format!("the volume is {volume:.3e} mm3 for an area of {area:.3e} mm2") })
+    Err(RepairError::NotASolid {
+        why: format!("the volume is {volume:.3e} mm3 for an area of {area:.3e} mm2"),
+    })
 }
 
 /// Drops faces that name missing points, name one twice, or have coordinates that are not finite.
@@ -158,9 +205,16 @@ fn drop_unusable(mesh: &mut TriMesh, report: &mut RepairReport) -> Result<(), Re
     if !tags {
         mesh.tags.clear();
     }
-    let finite: Vec<bool> = mesh.points.iter().map(|p| p.iter().all(|x| x.is_finite())).collect();
+    let finite: Vec<bool> = mesh
+        .points
+        .iter()
+        .map(|p| p.iter().all(|x| x.is_finite()))
+        .collect();
     let missing = |t: &[u32; 3]| t.iter().any(|&v| v as usize >= count);
-    let infinite = |t: &[u32; 3]| t.iter().any(|&v| !finite.get(v as usize).copied().unwrap_or(true));
+    let infinite = |t: &[u32; 3]| {
+        t.iter()
+            .any(|&v| !finite.get(v as usize).copied().unwrap_or(true))
+    };
     let (mut bad, mut wild, mut first) = (0, 0, None);
     let mut keep = Vec::with_capacity(mesh.triangles.len());
     for (index, t) in mesh.triangles.iter().enumerate() {
@@ -175,32 +229,60 @@ fn drop_unusable(mesh: &mut TriMesh, report: &mut RepairReport) -> Result<(), Re
     retain(mesh, &keep);
     if bad > 0 {
         let text = format!("{bad} faces that name missing points dropped");
-        report.repairs.push(Repair::new(RepairKind::BadFaces, bad, text));
+        report
+            .repairs
+            .push(Repair::new(RepairKind::BadFaces, bad, text));
     }
     if let Some(first) = first {
-        let text = format!("{wild} faces with coordinates NaN or infinite dropped, the first is face {first}");
-        report.repairs.push(Repair::new(RepairKind::NonFinite, wild, text));
+        let text = format!(
+            "{wild} faces with coordinates NaN or infinite dropped, the first is face {first}"
+        );
+        report
+            .repairs
+            .push(Repair::new(RepairKind::NonFinite, wild, text));
     }
     if mesh.triangles.is_empty() {
-        let why = if bad > 0 { "missing points" } else { "no finite coordinates" };
-        return Err(RepairError::Empty { triangles: report.triangles, dropped: bad + wild, why });
+        let why = if bad > 0 {
+            "missing points"
+        } else {
+            "no finite coordinates"
+        };
+        return Err(RepairError::Empty {
+            triangles: report.triangles,
+            dropped: bad + wild,
+            why,
+        });
     }
     drop_unused_points(mesh);
     Ok(())
 }
 
 /// Refuses parts without sensible size, notes coarse coordinates; gives the step between numbers at the largest coordinate.
-fn check_scale(mesh: &TriMesh, options: &RepairOptions, report: &mut RepairReport) -> Result<f64, RepairError> {
-    let Some((lower, upper)) = mesh.bounds() else { return Ok(0.0) };
+fn check_scale(
+    mesh: &TriMesh,
+    options: &RepairOptions,
+    report: &mut RepairReport,
+) -> Result<f64, RepairError> {
+    let Some((lower, upper)) = mesh.bounds() else {
+        return Ok(0.0);
+    };
     let size = (upper - lower).norm();
     if size.is_nan() || size > options.max_size {
-        return Err(RepairError::TooLarge { size, limit: options.max_size });
+        return Err(RepairError::TooLarge {
+            size,
+            limit: options.max_size,
+        });
     }
     if size <= 0.0 {
-        return Err(RepairError::NotASolid { why: "all points lie in one place".into() });
+        return Err(RepairError::NotASolid {
+            why: "all points lie in one place".into(),
+        });
     }
     let offset = lower.amax().max(upper.amax());
-    let single = mesh.points.par_iter().all(|p| p.iter().all(|x| f64::from(*x as f32) == *x));
+    let single = mesh
+        .points
+        .par_iter()
+        .all(|p| p.iter().all(|x| f64::from(*x as f32) == *x));
     let digits = if single { 23 } else { 52 };
     let step = (offset.log2().floor() - f64::from(digits)).exp2();
     if step > HOPELESS * size {
@@ -211,10 +293,15 @@ fn check_scale(mesh: &TriMesh, options: &RepairOptions, report: &mut RepairRepor
             "coordinates lie {offset:.3e} mm from the origin, where numbers step by {step:.3} mm: the shape is only known to {:.2} % of its {size:.1} mm",
             100.0 * step / size
         );
-        report.repairs.push(Repair::new(RepairKind::PrecisionLoss, mesh.points.len(), text));
+        report.repairs.push(Repair::new(
+            RepairKind::PrecisionLoss,
+            mesh.points.len(),
+            text,
+        ));
     }
     if size < TINY {
-        let text = format!("the part is only {size:.3e} mm long: check the unit of the file (`scale`)");
+        let text =
+            format!("the part is only {size:.3e} mm long: check the unit of the file (`scale`)");
         report.repairs.push(Repair::new(RepairKind::Scale, 1, text));
     }
     Ok(step)
@@ -223,7 +310,8 @@ fn check_scale(mesh: &TriMesh, options: &RepairOptions, report: &mut RepairRepor
 /// Keeps the triangles that `keep` marks, with their tags.
 fn retain(mesh: &mut TriMesh, keep: &[bool]) {
     let mut flags = keep.iter();
-    mesh.triangles.retain(|_| flags.next().copied().unwrap_or(false));
+    mesh.triangles
+        .retain(|_| flags.next().copied().unwrap_or(false));
     let mut flags = keep.iter();
     mesh.tags.retain(|_| flags.next().copied().unwrap_or(false));
 }
@@ -241,7 +329,8 @@ fn drop_unused_points(mesh: &mut TriMesh) {
         count += u32::from(*used);
     }
     let mut flags = used.iter();
-    mesh.points.retain(|_| flags.next().copied().unwrap_or(false));
+    mesh.points
+        .retain(|_| flags.next().copied().unwrap_or(false));
     for v in mesh.triangles.iter_mut().flatten() {
         *v = new[*v as usize];
     }

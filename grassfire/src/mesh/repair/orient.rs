@@ -29,7 +29,11 @@ pub(super) fn orient(mesh: &mut TriMesh, repairs: &mut Vec<Repair>) {
             flips += usize::from(turned[t as usize]);
         }
     }
-    let agree = |h: &[u32]| h.len() != 2 || runs_alike(mesh, h[0], h[1]) == (turned[h[0] as usize / 3] != turned[h[1] as usize / 3]);
+    let agree = |h: &[u32]| {
+        h.len() != 2
+            || runs_alike(mesh, h[0], h[1])
+                == (turned[h[0] as usize / 3] != turned[h[1] as usize / 3])
+    };
     let conflicts = edges.iter().filter(|h| !agree(h)).count();
     for (t, _) in turned.iter().enumerate().filter(|(_, turned)| **turned) {
         mesh.triangles[t].swap(1, 2);
@@ -39,13 +43,26 @@ pub(super) fn orient(mesh: &mut TriMesh, repairs: &mut Vec<Repair>) {
         repairs.push(Repair::new(RepairKind::Reoriented, flips, text));
     }
     if conflicts > 0 {
-        let text = format!("{conflicts} edges whose two faces cannot be made to agree (one-sided surface)");
-        repairs.push(Repair::new(RepairKind::OrientationConflict, conflicts, text));
+        let text = format!(
+            "{conflicts} edges whose two faces cannot be made to agree (one-sided surface)"
+        );
+        repairs.push(Repair::new(
+            RepairKind::OrientationConflict,
+            conflicts,
+            text,
+        ));
     }
 }
 
 /// Visits the patch of `seed` face by face.
-fn spread(mesh: &TriMesh, edges: &Edges, seed: usize, seen: &mut [bool], turned: &mut [bool], patch: &mut Vec<u32>) {
+fn spread(
+    mesh: &TriMesh,
+    edges: &Edges,
+    seed: usize,
+    seen: &mut [bool],
+    turned: &mut [bool],
+    patch: &mut Vec<u32>,
+) {
     patch.clear();
     patch.push(seed as u32);
     seen[seed] = true;

@@ -26,7 +26,9 @@ fn project(p: &Vec3) -> [f64; 2] {
 impl<'a> Rays<'a> {
     /// `shell` is the shell of each triangle.
     pub fn new(mesh: &'a TriMesh, shell: &'a [u32]) -> Self {
-        let boxes: Vec<[[f64; 2]; 2]> = (0..mesh.triangles.len()).map(|t| flat_box(mesh, t)).collect();
+        let boxes: Vec<[[f64; 2]; 2]> = (0..mesh.triangles.len())
+            .map(|t| flat_box(mesh, t))
+            .collect();
         let mut lower = [f64::INFINITY; 2];
         let mut upper = [f64::NEG_INFINITY; 2];
         for [lo, hi] in &boxes {
@@ -39,8 +41,17 @@ impl<'a> Rays<'a> {
         let mut side = (boxes.len() as f64).sqrt().clamp(1.0, 2000.0);
         loop {
             let cell = (span / side).max(f64::MIN_POSITIVE);
-            let dims = [0, 1].map(|a| (((upper[a] - lower[a]) / cell) as usize).min(side as usize) + 1);
-            let mut rays = Self { mesh, shell, lower, cell, dims, starts: Vec::new(), entries: Vec::new() };
+            let dims =
+                [0, 1].map(|a| (((upper[a] - lower[a]) / cell) as usize).min(side as usize) + 1);
+            let mut rays = Self {
+                mesh,
+                shell,
+                lower,
+                cell,
+                dims,
+                starts: Vec::new(),
+                entries: Vec::new(),
+            };
             let total: usize = boxes.iter().map(|b| rays.cells(b).count()).sum();
             if total <= MAX_ENTRIES * boxes.len() + 10_000 || side < 2.0 {
                 rays.insert(&boxes);
@@ -70,8 +81,14 @@ impl<'a> Rays<'a> {
     }
 
     fn cells(&self, b: &[[f64; 2]; 2]) -> impl Iterator<Item = usize> + use<> {
-        let at = |x: f64, a: usize| (((x - self.lower[a]) / self.cell) as usize).min(self.dims[a] - 1);
-        let (i0, i1, j0, j1) = (at(b[0][0], 0), at(b[1][0], 0), at(b[0][1], 1), at(b[1][1], 1));
+        let at =
+            |x: f64, a: usize| (((x - self.lower[a]) / self.cell) as usize).min(self.dims[a] - 1);
+        let (i0, i1, j0, j1) = (
+            at(b[0][0], 0),
+            at(b[1][0], 0),
+            at(b[0][1], 1),
+            at(b[1][1], 1),
+        );
         let width = self.dims[0];
         (j0..=j1).flat_map(move |j| (i0..=i1).map(move |i| j * width + i))
     }
@@ -82,19 +99,29 @@ impl<'a> Rays<'a> {
         if (0..2).any(|a| !(q[a] >= self.lower[a])) {
             return Vec::new();
         }
-        let Some(cell) = self.cells(&[q, q]).next() else { return Vec::new() };
+        let Some(cell) = self.cells(&[q, q]).next() else {
+            return Vec::new();
+        };
         let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
-        let mut hits: Vec<u32> =
-            self.entries[range].iter().filter(|&&t| self.crosses(t as usize, p, &q)).map(|&t| self.shell[t as usize]).collect();
+        let mut hits: Vec<u32> = self.entries[range]
+            .iter()
+            .filter(|&&t| self.crosses(t as usize, p, &q))
+            .map(|&t| self.shell[t as usize])
+            .collect();
         hits.sort_unstable();
-        hits.chunk_by(|a, b| a == b).filter(|run| run.len() % 2 == 1).map(|run| run[0]).collect()
+        hits.chunk_by(|a, b| a == b)
+            .filter(|run| run.len() % 2 == 1)
+            .map(|run| run[0])
+            .collect()
     }
 
     /// The ray from `p` towards larger x runs through triangle `t`.
     fn crosses(&self, t: usize, p: &Vec3, q: &[f64; 2]) -> bool {
         let corners = self.mesh.corners(t);
         let [a, b, c] = corners.map(|v| project(&v));
-        let side = |u: &[f64; 2], v: &[f64; 2]| (u[0] - q[0]) * (v[1] - q[1]) - (u[1] - q[1]) * (v[0] - q[0]);
+        let side = |u: &[f64; 2], v: &[f64; 2]| {
+            (u[0] - q[0]) * (v[1] - q[1]) - (u[1] - q[1]) * (v[0] - q[0])
+        };
         let (wa, wb, wc) = (side(&b, &c), side(&c, &a), side(&a, &b));
         let inside = (wa > 0.0 && wb > 0.0 && wc > 0.0) || (wa < 0.0 && wb < 0.0 && wc < 0.0);
         let sum = wa + wb + wc;

@@ -119,7 +119,11 @@ pub struct Repair {
 impl Repair {
     /// A repair of `count` elements.
     pub fn new(kind: RepairKind, count: usize, text: impl Into<String>) -> Self {
-        Self { kind, count, text: text.into() }
+        Self {
+            kind,
+            count,
+            text: text.into(),
+        }
     }
 }
 
@@ -179,7 +183,9 @@ pub enum RepairError {
         limit: f64,
     },
     /// The coordinates carry no shape any more.
-    #[error("the coordinates lie {offset:.3e} mm from the origin, where numbers step by {step:.3e} mm; the part is only {size:.3e} mm long")]
+    #[error(
+        "the coordinates lie {offset:.3e} mm from the origin, where numbers step by {step:.3e} mm; the part is only {size:.3e} mm long"
+    )]
     PrecisionLost {
         /// Largest coordinate, mm.
         offset: f64,
@@ -215,7 +221,9 @@ impl RepairError {
             Self::TooMany { .. } => "decimate the mesh first",
             Self::TooLarge { .. } => "set `scale` to millimetres per unit of the file",
             Self::PrecisionLost { .. } => "move the part near the origin before exporting it",
-            Self::NotASolid { .. } => "export a closed surface around the material; sheets have no inside",
+            Self::NotASolid { .. } => {
+                "export a closed surface around the material; sheets have no inside"
+            }
             Self::Strict { .. } => "leave out `strict` to have it repaired",
             Self::Cancelled(_) => return None,
         };

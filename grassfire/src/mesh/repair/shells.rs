@@ -22,18 +22,34 @@ struct Shell {
 }
 
 /// Drops small pieces, then turns each shell outward or, inside an odd number of others, inward.
-pub(super) fn sort_out(mesh: &mut TriMesh, options: &RepairOptions, repairs: &mut Vec<Repair>, monitor: &Monitor) -> Result<(), RepairError> {
+pub(super) fn sort_out(
+    mesh: &mut TriMesh,
+    options: &RepairOptions,
+    repairs: &mut Vec<Repair>,
+    monitor: &Monitor,
+) -> Result<(), RepairError> {
     drop_islands(mesh, options, repairs)?;
     let (shells, of_face) = shells(mesh);
     let nesting = nesting(mesh, &shells, &of_face, monitor)?;
     turn(mesh, &shells, &nesting, repairs);
     if !nesting.overlaps.is_empty() {
-        let text = format!("{} pairs of bodies overlap: the remesh unites them, the volume counts the common part twice", nesting.overlaps.len());
-        repairs.push(Repair::new(RepairKind::Overlap, nesting.overlaps.len(), text));
+        let text = format!(
+            "{} pairs of bodies overlap: the remesh unites them, the volume counts the common part twice",
+            nesting.overlaps.len()
+        );
+        repairs.push(Repair::new(
+            RepairKind::Overlap,
+            nesting.overlaps.len(),
+            text,
+        ));
     }
     let bodies = nesting.depth.iter().filter(|d| **d % 2 == 0).count();
     if bodies > 1 {
-        repairs.push(Repair::new(RepairKind::Bodies, bodies, format!("{bodies} separate bodies, all kept")));
+        repairs.push(Repair::new(
+            RepairKind::Bodies,
+            bodies,
+            format!("{bodies} separate bodies, all kept"),
+        ));
     }
     Ok(())
 }
@@ -51,16 +67,26 @@ fn shells(mesh: &TriMesh) -> (Vec<Shell>, Vec<u32>) {
     }
     let shells = faces.into_iter().zip(open).map(|(faces, open)| {
         let centre = middle(mesh, &faces);
-        let volume = faces.iter().map(|&t| wedge(mesh, t as usize, &centre)).sum();
+        let volume = faces
+            .iter()
+            .map(|&t| wedge(mesh, t as usize, &centre))
+            .sum();
         let closed = open as f64 <= MAX_OPEN * 1.5 * faces.len() as f64;
-        Shell { faces, volume, centre, closed }
+        Shell {
+            faces,
+            volume,
+            centre,
+            closed,
+        }
     });
     (shells.collect(), pieces.of_face)
 }
 
 /// Area-weighted centre; the middle that makes the volume of an open piece least arbitrary.
 fn middle(mesh: &TriMesh, faces: &[u32]) -> Vec3 {
-    let Some(&first) = faces.first() else { return Vec3::zeros() };
+    let Some(&first) = faces.first() else {
+        return Vec3::zeros();
+    };
     let base = mesh.corners(first as usize)[0];
     let (mut sum, mut total) = (Vec3::zeros(), 0.0);
     for &t in faces {
@@ -69,7 +95,11 @@ fn middle(mesh: &TriMesh, faces: &[u32]) -> Vec3 {
         sum += (a + b + c) * (area / 3.0);
         total += area;
     }
-    if total > 0.0 { base + sum / total } else { base }
+    if total > 0.0 {
+        base + sum / total
+    } else {
+        base
+    }
 }
 
 fn wedge(mesh: &TriMesh, t: usize, base: &Vec3) -> f64 {
@@ -77,18 +107,31 @@ fn wedge(mesh: &TriMesh, t: usize, base: &Vec3) -> f64 {
     a.dot(&b.cross(&c)) / 6.0
 }
 
-fn drop_islands(mesh: &mut TriMesh, options: &RepairOptions, repairs: &mut Vec<Repair>) -> Result<(), RepairError> {
+fn drop_islands(
+    mesh: &mut TriMesh,
+    options: &RepairOptions,
+    repairs: &mut Vec<Repair>,
+) -> Result<(), RepairError> {
     let (shells, of_face) = shells(mesh);
     let largest = shells.iter().map(|s| s.volume.abs()).fold(0.0, f64::max);
     if largest <= 0.0 {
-        return Err(RepairError::NotASolid { why: format!("none of its {} pieces encloses a volume", shells.len()) });
+        return Err(RepairError::NotASolid {
+            why: format!("none of its {} pieces encloses a volume", shells.len()),
+        });
     }
-    let small: Vec<bool> = shells.iter().map(|s| s.volume.abs() < options.min_volume_share * largest).collect();
+    let small: Vec<bool> = shells
+        .iter()
+        .map(|s| s.volume.abs() < options.min_volume_share * largest)
+        .collect();
     let count = small.iter().filter(|s| **s).count();
     if count == 0 {
         return Ok(());
     }
-    let gone = shells.iter().zip(&small).filter(|(_, small)| **small).map(|(s, _)| s);
+    let gone = shells
+        .iter()
+        .zip(&small)
+        .filter(|(_, small)| **small)
+        .map(|(s, _)| s);
     let volume: f64 = gone.clone().map(|s| s.volume.abs()).sum();
     let first = gone.clone().next().map(|s| s.centre).unwrap_or_default();
     let text = format!(
@@ -108,8 +151,16 @@ struct Nesting {
     overlaps: Vec<(u32, u32)>,
 }
 
-fn nesting(mesh: &TriMesh, shells: &[Shell], of_face: &[u32], monitor: &Monitor) -> Result<Nesting, RepairError> {
-    let mut nesting = Nesting { depth: vec![0; shells.len()], overlaps: Vec::new() };
+fn nesting(
+    mesh: &TriMesh,
+    shells: &[Shell],
+    of_face: &[u32],
+    monitor: &Monitor,
+) -> Result<Nesting, RepairError> {
+    let mut nesting = Nesting {
+        depth: vec![0; shells.len()],
+        overlaps: Vec::new(),
+    };
     if shells.len() < 2 {
         return Ok(nesting);
     }
@@ -135,7 +186,9 @@ fn nesting(mesh: &TriMesh, shells: &[Shell], of_face: &[u32], monitor: &Monitor)
             if run.len() + slack >= samples {
                 nesting.depth[index] += 1;
             } else if run.len() > slack {
-                nesting.overlaps.push((index.min(other) as u32, index.max(other) as u32));
+                nesting
+                    .overlaps
+                    .push((index.min(other) as u32, index.max(other) as u32));
             }
         }
     }
@@ -159,7 +212,10 @@ fn turn(mesh: &mut TriMesh, shells: &[Shell], nesting: &Nesting, repairs: &mut V
         }
     }
     if inverted > 0 {
-        let text = format!("{inverted} of {} shells were inside out and were turned", shells.len());
+        let text = format!(
+            "{inverted} of {} shells were inside out and were turned",
+            shells.len()
+        );
         repairs.push(Repair::new(RepairKind::InsideOut, inverted, text));
     }
     if let Some((first, _)) = voids.first() {

@@ -22,7 +22,13 @@ const MAX_VALENCE: usize = 4096;
 /// Unites points that are equal when rounded to `resolution`, the step between numbers at the largest coordinate. So 1e-17 equals 0
 /// in a file of float32, while all that the file can tell apart stays apart.
 pub(super) fn exact(mesh: &mut TriMesh, resolution: f64) {
-    let round = |x: f64| if resolution > 0.0 { (x / resolution).round() } else { x };
+    let round = |x: f64| {
+        if resolution > 0.0 {
+            (x / resolution).round()
+        } else {
+            x
+        }
+    };
     // Adding 0 turns -0 into 0, which has other bits.
     let key = |v: u32| mesh.points[v as usize].map(|x| (round(x) + 0.0).to_bits());
     let mut order: Vec<u32> = (0..mesh.points.len() as u32).collect();
@@ -52,7 +58,9 @@ pub(super) fn tolerant(
     repairs: &mut Vec<Repair>,
     monitor: &Monitor,
 ) -> Result<(), RepairError> {
-    let Some((lower, upper)) = mesh.bounds() else { return Ok(()) };
+    let Some((lower, upper)) = mesh.bounds() else {
+        return Ok(());
+    };
     let diagonal = (upper - lower).norm();
     let before = edges.open();
     let border = border_points(mesh, edges);
@@ -61,7 +69,9 @@ pub(super) fn tolerant(
     for share in LADDER {
         monitor.check()?;
         let tolerance = share * options.weld_tolerance * diagonal;
-        let Some(pairs) = near_pairs(mesh, &border, tolerance) else { break };
+        let Some(pairs) = near_pairs(mesh, &border, tolerance) else {
+            break;
+        };
         let candidate = unite(mesh, &border, &incident, pairs);
         let open = Edges::new(&without_repeats(&candidate)).open();
         if best.as_ref().is_none_or(|(least, ..)| open < *least) {
@@ -73,7 +83,9 @@ pub(super) fn tolerant(
     }
     if let Some((open, tolerance, united)) = best.filter(|(open, ..)| 2 * open <= before) {
         let count = mesh.points.len() - united.points.len();
-        let text = format!("{count} points united within {tolerance:.3e} mm: {before} open edges became {open}");
+        let text = format!(
+            "{count} points united within {tolerance:.3e} mm: {before} open edges became {open}"
+        );
         repairs.push(Repair::new(RepairKind::Welded, count, text));
         *mesh = united;
     }
@@ -82,12 +94,21 @@ pub(super) fn tolerant(
 
 fn without_repeats(mesh: &TriMesh) -> TriMesh {
     let good = |t: &&[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
-    TriMesh { points: Vec::new(), triangles: mesh.triangles.iter().filter(good).copied().collect(), tags: Vec::new() }
+    TriMesh {
+        points: Vec::new(),
+        triangles: mesh.triangles.iter().filter(good).copied().collect(),
+        tags: Vec::new(),
+    }
 }
 
 fn border_points(mesh: &TriMesh, edges: &Edges) -> Vec<u32> {
     let open = edges.iter().filter(|h| h.len() == 1).map(|h| h[0] as usize);
-    let ends = open.flat_map(|h| [mesh.triangles[h / 3][h % 3], mesh.triangles[h / 3][(h % 3 + 1) % 3]]);
+    let ends = open.flat_map(|h| {
+        [
+            mesh.triangles[h / 3][h % 3],
+            mesh.triangles[h / 3][(h % 3 + 1) % 3],
+        ]
+    });
     let mut border: Vec<u32> = ends.collect();
     border.sort_unstable();
     border.dedup();
@@ -118,7 +139,9 @@ fn near_pairs(mesh: &TriMesh, border: &[u32], tolerance: f64) -> Option<Vec<(u32
     let (lower, _) = mesh.bounds()?;
     let point = |i: u32| mesh.points[border[i as usize] as usize];
     let cell = |p: &Vec3| ((p - lower) / tolerance).map(|x| x.floor() as i64);
-    let mut sorted: Vec<([i64; 3], u32)> = (0..border.len() as u32).map(|i| (cell(&point(i)).into(), i)).collect();
+    let mut sorted: Vec<([i64; 3], u32)> = (0..border.len() as u32)
+        .map(|i| (cell(&point(i)).into(), i))
+        .collect();
     sorted.par_sort_unstable();
     let mut begin: HashMap<[i64; 3], usize> = HashMap::with_capacity(sorted.len());
     for (at, (cell, _)) in sorted.iter().enumerate() {
@@ -128,8 +151,14 @@ fn near_pairs(mesh: &TriMesh, border: &[u32], tolerance: f64) -> Option<Vec<(u32
     let mut looked = 0;
     for &(cell, i) in &sorted {
         for shift in 0..27i64 {
-            let near = [cell[0] + shift % 3 - 1, cell[1] + shift / 3 % 3 - 1, cell[2] + shift / 9 - 1];
-            let Some(&start) = begin.get(&near) else { continue };
+            let near = [
+                cell[0] + shift % 3 - 1,
+                cell[1] + shift / 3 % 3 - 1,
+                cell[2] + shift / 9 - 1,
+            ];
+            let Some(&start) = begin.get(&near) else {
+                continue;
+            };
             for &(_, j) in sorted[start..].iter().take_while(|(c, _)| *c == near) {
                 looked += 1;
                 let distance = (point(i) - point(j)).norm();
