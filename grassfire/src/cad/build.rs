@@ -8,13 +8,10 @@ use super::bores::{self, Bore};
 use super::inspect::{self, NonDesignResult};
 use super::non_design::NonDesignBody;
 use super::reference::{self, Probe};
-use super::{CadError, CadOptions, array, patches, shells};
+use super::{CadError, CadOptions, array, patches, shells, split};
 use crate::Vec3;
 use crate::monitor::Monitor;
-use crate::spline::Brep;
-
-/// Makes the same body with one face a quad: more faces, but booleans that fail on merged faces can work on them.
-pub type QuadsBrep<'a> = &'a dyn Fn() -> Result<Brep, String>;
+use crate::spline::{Brep, BrepFace};
 
 /// Where a face of the part comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,8 +76,8 @@ const REGION_TOLERANCE: f64 = 0.01;
 /// 2. Fuse all non-design bodies with their bores filled, then cut the bores: organic material never stays in a bore.
 /// 3. Check the union: no warnings, BRepCheck, closed, number of solids, inclusion-exclusion to 1e-6, and the volume,
 ///    the common part, the removed part and each body's region against ray integrals that use no boolean.
-/// 4. When a check fails: larger fuzzy value, faces per quad, a small shift, one body at a time; at last the bodies side by
-///    side with `valid = false`.
+/// 4. When a check fails: faces near the non-design bodies cut into single polynomials, then also a larger fuzzy value, a
+///    small shift of the fitted body, one body at a time; at last the bodies side by side with `valid = false`.
 ///
 /// # Errors
 /// [`CadError::BadBrep`], [`CadError::MisplacedShell`], [`CadError::Kernel`] when the body itself cannot be built, and
@@ -89,18 +86,18 @@ pub fn build(
     brep: &Brep,
     bodies: &[NonDesignBody],
     options: &CadOptions,
-    quads: Option<QuadsBrep>,
     monitor: &Monitor,
 ) -> Result<CadSolid, CadError> {
     monitor.step(STAGE, "building faces", 0.0)?;
     let body = Body::new(brep)?;
     let mut messages: Vec<String> = body.problems.clone();
-    if !messages.is_empty() || bodies.is_empty() {
+    let sound = messages.is_empty();
+    if !sound || bodies.is_empty() {
         let sources = vec![FaceSource::Organic; brep.faces.len()];
         let shape = if bodies.is_empty() { single(body.shape)? } else { side_by_side(&body.shape, bodies)? };
         let context = inspect::Context { bodies, options, probes: &[], reference: brep.volume };
         let sources = if bodies.is_empty() { sources } else { inspect::separate_sources(&sources, bodies)? };
-        return inspect::report(shape, sources, messages, &context, monitor);
+        return inspect::report(shape, sources, messages, sound, &context, monitor);
     }
     let bodies_holes = free_bores(bodies)?;
     let tools: Vec<Option<Shape>> = bodies_holes.iter().map(|bores| tool(bores)).collect::<Result<_, _>>()?;
@@ -109,26 +106,31 @@ pub fn build(
     let inputs = Inputs { bosses: disjoint(bodies.iter().map(|b| &b.boss), options)?, tools: disjoint(tools.iter().flatten(), options)? };
     let context = inspect::Context { bodies, options, probes: &probes, reference };
 
+    let mut split_body = None;
     for attempt in ATTEMPTS {
-        monitor.step(STAGE, attempt.text(), 0.3)?;
-        let outcome = attempt.run(brep, &body, &inputs, quads, &context, monitor);
+        monitor.step(STAGE, attempt.text, 0.3)?;
+        let body = match (&mut split_body, attempt.split) {
+            (_, false) => &body,
+            (Some(split), true) => split,
+            (none, true) => none.insert(Body::new(&split::split(brep, &near(brep, bodies, &tools)?))?),
+        };
+        let outcome = attempt.run(body, &inputs, &context, monitor);
         monitor.check()?;
         match outcome {
             Ok(united) => {
-                if let Some(text) = attempt.note() {
-                    messages.push(format!("the union worked {text}"));
+                if !messages.is_empty() {
+                    messages.push(format!("passed: {}", attempt.text));
                 }
                 monitor.step(STAGE, "inspecting", 0.8)?;
-                return inspect::report(united.shape, inspect::sources(&united.mesh_shape, &united.kinds, &context)?, messages, &context, monitor);
+                let sources = inspect::sources(&united.mesh_shape, &united.kinds, &context)?;
+                return inspect::report(united.shape, sources, messages, true, &context, monitor);
             }
-            Err(reason) => messages.push(format!("{}: {reason}", attempt.text())),
+            Err(reason) => messages.push(format!("{} failed: {reason}", attempt.text)),
         }
     }
     messages.push("no union passed its checks; the fitted body and the non-design bodies are written side by side".into());
     let sources = inspect::separate_sources(&vec![FaceSource::Organic; brep.faces.len()], bodies)?;
-    let mut out = inspect::report(side_by_side(&body.shape, bodies)?, sources, messages, &context, monitor)?;
-    out.valid = false;
-    Ok(out)
+    inspect::report(side_by_side(&body.shape, bodies)?, sources, messages, false, &context, monitor)
 }
 
 /// The fitted body as solids.
@@ -241,68 +243,55 @@ pub(crate) struct United {
     kinds: Vec<Kind>,
 }
 
+/// One way to make the union.
 #[derive(Debug, Clone, Copy)]
-enum Attempt {
-    Plain,
-    Fuzzy,
-    Quads,
-    Shift,
-    OneByOne,
+struct Attempt {
+    text: &'static str,
+    /// Faces near the non-design bodies are single polynomials.
+    split: bool,
+    larger_fuzzy: bool,
+    shift: bool,
+    one_by_one: bool,
 }
 
-const ATTEMPTS: [Attempt; 5] = [Attempt::Plain, Attempt::Fuzzy, Attempt::Quads, Attempt::Shift, Attempt::OneByOne];
+const PLAIN: Attempt = Attempt { text: "union of all bodies", split: false, larger_fuzzy: false, shift: false, one_by_one: false };
+const SPLIT: Attempt = Attempt { text: "union with smaller faces near the non-design bodies", split: true, ..PLAIN };
+const ATTEMPTS: [Attempt; 5] = [
+    PLAIN,
+    SPLIT,
+    Attempt { text: "union with smaller faces and a larger fuzzy value", larger_fuzzy: true, ..SPLIT },
+    Attempt { text: "union with smaller faces after a small shift of the fitted body", shift: true, ..SPLIT },
+    Attempt { text: "union with smaller faces, one body at a time", one_by_one: true, ..SPLIT },
+];
 
 impl Attempt {
-    fn text(self) -> &'static str {
-        match self {
-            Self::Plain => "uniting all bodies",
-            Self::Fuzzy => "uniting with a larger fuzzy value",
-            Self::Quads => "uniting with one face a quad",
-            Self::Shift => "uniting after a small shift of the fitted body",
-            Self::OneByOne => "uniting one body at a time",
-        }
-    }
-
-    fn note(self) -> Option<&'static str> {
-        match self {
-            Self::Plain => None,
-            Self::Fuzzy => Some("with a larger fuzzy value"),
-            Self::Quads => Some("with one face a quad"),
-            Self::Shift => Some("after a small shift of the fitted body"),
-            Self::OneByOne => Some("one body at a time"),
-        }
-    }
-
-    fn run(
-        self,
-        brep: &Brep,
-        body: &Body,
-        inputs: &Inputs,
-        quads: Option<QuadsBrep>,
-        context: &inspect::Context,
-        monitor: &Monitor,
-    ) -> Result<United, String> {
+    fn run(self, body: &Body, inputs: &Inputs, context: &inspect::Context, monitor: &Monitor) -> Result<United, String> {
         let options = context.options;
-        let unite = |body: &Body, fuzzy| unite(body, inputs, fuzzy, false, context, monitor);
-        match self {
-            Self::Plain => unite(body, options.fuzzy),
-            Self::Fuzzy => unite(body, options.fuzzy_retry),
-            Self::Quads => {
-                let brep = quads.ok_or("no description with one face a quad was given")?()?;
-                let body = Body::new(&brep).map_err(|e| e.to_string())?;
-                match body.problems.first() {
-                    Some(problem) => Err(problem.clone()),
-                    None => unite(&body, options.fuzzy),
-                }
-            }
-            Self::Shift => {
-                let by = Vec3::new(0.6, 0.48, 0.64) * options.shift;
-                let shape = body.shape.translated(array(by)).map_err(|e| e.0)?;
-                unite(&Body { shape, problems: Vec::new(), volume: brep.volume, ..*body }, options.fuzzy)
-            }
-            Self::OneByOne => super::build::unite(body, inputs, options.fuzzy, true, context, monitor),
+        let fuzzy = if self.larger_fuzzy { options.fuzzy_retry } else { options.fuzzy };
+        if let Some(problem) = body.problems.first() {
+            return Err(problem.clone());
         }
+        if !self.shift {
+            return unite(body, inputs, fuzzy, self.one_by_one, context, monitor);
+        }
+        let by = Vec3::new(0.6, 0.48, 0.64) * options.shift;
+        let shape = body.shape.translated(array(by)).map_err(|e| e.0)?;
+        unite(&Body { shape, problems: Vec::new(), ..*body }, inputs, fuzzy, self.one_by_one, context, monitor)
     }
+}
+
+/// Faces whose control points come near a non-design body or its tools.
+fn near(brep: &Brep, bodies: &[NonDesignBody], tools: &[Option<Shape>]) -> Result<Vec<bool>, OcctError> {
+    let margin = Vec3::repeat(0.5);
+    let shapes = bodies.iter().map(|b| &b.boss).chain(tools.iter().flatten());
+    let boxes: Vec<(Vec3, Vec3)> =
+        shapes.map(|s| s.bounds().map(|[lo, hi]| (Vec3::from(lo) - margin, Vec3::from(hi) + margin))).collect::<Result<_, _>>()?;
+    let meets = |face: &BrepFace| {
+        let first = face.control[0];
+        let (lo, hi) = face.control.iter().fold((first, first), |(lo, hi), p| (lo.inf(p), hi.sup(p)));
+        boxes.iter().any(|(a, b)| (0..3).all(|d| a[d] <= hi[d] && lo[d] <= b[d]))
+    };
+    Ok(brep.faces.iter().map(meets).collect())
 }
 
 /// Running result of the booleans.

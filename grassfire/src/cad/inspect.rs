@@ -107,10 +107,10 @@ pub(crate) fn report(
     shape: Shape,
     sources: Vec<FaceSource>,
     mut messages: Vec<String>,
+    mut valid: bool,
     context: &Context,
     monitor: &Monitor,
 ) -> Result<CadSolid, CadError> {
-    let mut valid = messages.iter().all(|m| m.starts_with("the union worked") || m.starts_with("uniting"));
     let counts = shape.counts()?;
     if let Some(text) = shape.faults()? {
         valid = false;

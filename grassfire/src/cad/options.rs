@@ -28,7 +28,7 @@ impl Default for CadOptions {
         Self {
             fuzzy: 1e-5,
             fuzzy_retry: 1e-4,
-            shift: 0.01,
+            shift: 0.03,
             volume_tolerance: 2e-3,
             distance_tolerance: 1e-3,
             boolean_seconds: 300.0,

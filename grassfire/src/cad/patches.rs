@@ -1,7 +1,7 @@
 //! Polynomial pieces of the B-rep's faces: Bezier extraction, points and triangles, independent of the CAD kernel.
 
 use crate::Vec3;
-use crate::spline::{Brep, BrepFace};
+use crate::spline::{Brep, BrepEdge, BrepFace};
 
 /// Control points of a bi-5 Bezier patch, `[u][v]`.
 pub(crate) type Bezier = [[Vec3; 6]; 6];
@@ -13,7 +13,7 @@ fn extraction(span: usize, spans: usize, k: usize) -> [(usize, f64); 2] {
     match k {
         0 if span > 0 => [(4 * span, 0.5), (4 * span + 1, 0.5)],
         5 if span + 1 < spans => [(4 * span + 4, 0.5), (4 * span + 5, 0.5)],
-        _ => [(4 * span + k, 1.0), (4 * span + k, 0.0)],
+        _ => [(4 * span + k, 1.0), (4 * span + k, 0.0)], // one point; the second does not count
     }
 }
 
@@ -32,6 +32,11 @@ pub(crate) fn bezier(face: &BrepFace, u: usize, v: usize) -> Bezier {
             sum
         })
     })
+}
+
+/// The Bezier control points of one span of an edge.
+pub(crate) fn edge_bezier(edge: &BrepEdge, span: usize) -> [Vec3; 6] {
+    std::array::from_fn(|k| extraction(span, edge.spans as usize, k).iter().map(|&(i, w)| edge.control[i] * w).sum())
 }
 
 /// All Bezier patches of a face.
