@@ -51,7 +51,11 @@ pub struct NonDesignOptions {
 
 impl Default for NonDesignOptions {
     fn default() -> Self {
-        Self { mesh_tolerance: 0.02, sharp_angle: 25.0, bore_extension: 1.0 }
+        Self {
+            mesh_tolerance: 0.02,
+            sharp_angle: 25.0,
+            bore_extension: 1.0,
+        }
     }
 }
 
@@ -71,6 +75,11 @@ pub struct StepOptions {
 
 impl Default for StepOptions {
     fn default() -> Self {
-        Self { product: "part".into(), author: String::new(), organization: String::new(), time_stamp: String::new() }
+        Self {
+            product: "part".into(),
+            author: String::new(),
+            organization: String::new(),
+            time_stamp: String::new(),
+        }
     }
 }
