@@ -10,14 +10,25 @@ const INSTALL: &str = "apt-get install -y --no-install-recommends libocct-founda
 
 fn main() {
     println!("cargo:rerun-if-env-changed=OCCT_ROOT");
-    for file in ["cpp/bridge.h", "cpp/build.cpp", "cpp/boolean.cpp", "cpp/query.cpp", "cpp/exchange.cpp"] {
+    for file in [
+        "cpp/bridge.h",
+        "cpp/build.cpp",
+        "cpp/boolean.cpp",
+        "cpp/query.cpp",
+        "cpp/exchange.cpp",
+    ] {
         println!("cargo:rerun-if-changed={file}");
     }
     let (include, library) = locate();
     let (major, minor) = version(&include).unwrap_or_else(|| missing(&include));
 
     cxx_build::bridge("src/ffi.rs")
-        .files(["cpp/build.cpp", "cpp/boolean.cpp", "cpp/query.cpp", "cpp/exchange.cpp"])
+        .files([
+            "cpp/build.cpp",
+            "cpp/boolean.cpp",
+            "cpp/query.cpp",
+            "cpp/exchange.cpp",
+        ])
         // Not our headers: no warnings about them.
         .flag(format!("-isystem{}", include.display()))
         .std("c++17")
@@ -32,11 +43,28 @@ fn main() {
     let step: &[&str] = if (major, minor) >= (7, 8) {
         &["TKDESTEP", "TKDE", "TKXSBase"]
     } else {
-        &["TKSTEP", "TKSTEPAttr", "TKSTEP209", "TKSTEPBase", "TKXSBase"]
+        &[
+            "TKSTEP",
+            "TKSTEPAttr",
+            "TKSTEP209",
+            "TKSTEPBase",
+            "TKXSBase",
+        ]
     };
     let modelling = [
-        "TKBO", "TKBool", "TKPrim", "TKMesh", "TKShHealing", "TKTopAlgo", "TKGeomAlgo", "TKBRep", "TKGeomBase", "TKG3d",
-        "TKG2d", "TKMath", "TKernel",
+        "TKBO",
+        "TKBool",
+        "TKPrim",
+        "TKMesh",
+        "TKShHealing",
+        "TKTopAlgo",
+        "TKGeomAlgo",
+        "TKBRep",
+        "TKGeomBase",
+        "TKG3d",
+        "TKG2d",
+        "TKMath",
+        "TKernel",
     ];
     for name in step.iter().chain(&modelling) {
         println!("cargo:rustc-link-lib=dylib={name}");
@@ -49,14 +77,20 @@ fn locate() -> (PathBuf, Option<PathBuf>) {
         return (PathBuf::from("/usr/include/opencascade"), None);
     };
     let nested = root.join("include/opencascade");
-    let include = if nested.exists() { nested } else { root.join("include") };
+    let include = if nested.exists() {
+        nested
+    } else {
+        root.join("include")
+    };
     (include, Some(root.join("lib")))
 }
 
 fn version(include: &Path) -> Option<(u32, u32)> {
     let text = fs::read_to_string(include.join("Standard_Version.hxx")).ok()?;
     let number = |name: &str| {
-        let line = text.lines().find(|l| l.starts_with("#define") && l.split_whitespace().nth(1) == Some(name))?;
+        let line = text
+            .lines()
+            .find(|l| l.starts_with("#define") && l.split_whitespace().nth(1) == Some(name))?;
         line.split_whitespace().nth(2)?.parse().ok()
     };
     Some((number("OCC_VERSION_MAJOR")?, number("OCC_VERSION_MINOR")?))
@@ -65,6 +99,8 @@ fn version(include: &Path) -> Option<(u32, u32)> {
 fn missing(include: &Path) -> ! {
     eprintln!("error: no OpenCASCADE headers in {}", include.display());
     eprintln!("hint: {INSTALL}");
-    eprintln!("hint: or set OCCT_ROOT to an installation, or build without CAD output: cargo build --no-default-features");
+    eprintln!(
+        "hint: or set OCCT_ROOT to an installation, or build without CAD output: cargo build --no-default-features"
+    );
     process::exit(1);
 }

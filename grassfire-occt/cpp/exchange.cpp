@@ -18,6 +18,7 @@
 #include <STEPControl_Controller.hxx>
 #include <STEPControl_Reader.hxx>
 #include <STEPControl_Writer.hxx>
+#include <StepBasic_Product.hxx>
 #include <StepData_StepModel.hxx>
 #include <StepRepr_RepresentationItem.hxx>
 #include <TCollection_HAsciiString.hxx>
@@ -56,6 +57,16 @@ void fill_header(const Handle(StepData_StepModel)& model, const StepNames& names
   header.SetAuthorisation(text(rust::String("")));
   header.SetDescriptionValue(1, text(names.description));
   if (!names.time_stamp.empty()) header.SetTimeStamp(text(names.time_stamp));
+}
+
+// The writer appends a counter of the whole process to the product's name.
+void name_products(const Handle(StepData_StepModel)& model, const StepNames& names) {
+  for (int i = 1; i <= model->NbEntities(); ++i) {
+    const Handle(StepBasic_Product) product = Handle(StepBasic_Product)::DownCast(model->Value(i));
+    if (product.IsNull()) continue;
+    product->SetId(text(names.product));
+    product->SetName(text(names.product));
+  }
 }
 
 class UnionFind {
@@ -130,6 +141,7 @@ void write_step(const Shape& s, rust::Str path, const StepNames& names) {
   const Handle(Transfer_FinderProcess)& finder = writer.WS()->TransferWriter()->FinderProcess();
   name_items(finder, s.shape, TopAbs_FACE, names.faces);
   name_items(finder, s.shape, TopAbs_SOLID, names.solids);
+  name_products(writer.Model(), names);
   fill_header(writer.Model(), names);
   if (writer.Write(std::string(path).c_str()) != IFSelect_RetDone) throw std::runtime_error("the STEP file could not be written");
 }

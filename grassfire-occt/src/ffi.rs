@@ -102,7 +102,12 @@ pub(crate) mod bridge {
 
         fn build_brep(data: &BrepData) -> Result<UniquePtr<Shape>>;
         fn build_faceted(points: &[f64], triangles: &[u32]) -> Result<UniquePtr<Shape>>;
-        fn make_cylinder(start: &[f64], axis: &[f64], radius: f64, height: f64) -> Result<UniquePtr<Shape>>;
+        fn make_cylinder(
+            start: &[f64],
+            axis: &[f64],
+            radius: f64,
+            height: f64,
+        ) -> Result<UniquePtr<Shape>>;
         fn make_box(low: &[f64], high: &[f64]) -> Result<UniquePtr<Shape>>;
         fn make_revolve(origin: &[f64], axis: &[f64], profile: &[f64]) -> Result<UniquePtr<Shape>>;
         fn make_compound() -> Result<UniquePtr<Shape>>;

@@ -10,6 +10,7 @@
 #![deny(unsafe_op_in_unsafe_fn)]
 
 mod ffi;
+mod step_text;
 
 use std::fmt;
 use std::path::Path;
@@ -244,10 +245,16 @@ pub struct StepTexts {
 }
 
 impl Shape {
-    fn make(run: impl FnOnce() -> std::result::Result<UniquePtr<bridge::Shape>, cxx::Exception>) -> Result<Self> {
+    fn make(
+        run: impl FnOnce() -> std::result::Result<UniquePtr<bridge::Shape>, cxx::Exception>,
+    ) -> Result<Self> {
         let _guard = lock();
         let shape = run()?;
-        if shape.is_null() { Err(OcctError("the result is empty".into())) } else { Ok(Self(shape)) }
+        if shape.is_null() {
+            Err(OcctError("the result is empty".into()))
+        } else {
+            Ok(Self(shape))
+        }
     }
 
     /// Builds solids directly: shared vertices and edges, straight exact pcurves, no sewing. A compound of solids.
@@ -257,7 +264,12 @@ impl Shape {
     pub fn from_brep(brep: &BrepDescription) -> Result<Self> {
         check_description(brep)?;
         let solids: Vec<u32> = brep.solids.iter().map(|s| s.len() as u32).collect();
-        let shells: Vec<u32> = brep.solids.iter().flatten().map(|s| s.len() as u32).collect();
+        let shells: Vec<u32> = brep
+            .solids
+            .iter()
+            .flatten()
+            .map(|s| s.len() as u32)
+            .collect();
         let shell_faces: Vec<u32> = brep.solids.iter().flatten().flatten().copied().collect();
         let data = bridge::BrepData {
             vertices: &brep.vertices,
@@ -276,7 +288,11 @@ impl Shape {
 
     /// A solid of plane triangles with shared edges. The mesh must be closed, oriented and without degenerate triangles.
     pub fn from_triangles(points: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<Self> {
-        if triangles.iter().flatten().any(|&v| v as usize >= points.len()) {
+        if triangles
+            .iter()
+            .flatten()
+            .any(|&v| v as usize >= points.len())
+        {
             return Err(OcctError("a triangle names a missing point".into()));
         }
         check_finite(points.as_flattened())?;
@@ -298,7 +314,9 @@ impl Shape {
     /// The closed polygon `profile` of (radius, height) pairs turned once around the axis.
     pub fn revolve(origin: [f64; 3], axis: [f64; 3], profile: &[[f64; 2]]) -> Result<Self> {
         if profile.len() < 3 || profile.iter().any(|p| p[0].is_nan() || p[0] < 0.0) {
-            return Err(OcctError("a profile needs three or more points at radii of zero or more".into()));
+            return Err(OcctError(
+                "a profile needs three or more points at radii of zero or more".into(),
+            ));
         }
         check_finite(profile.as_flattened())?;
         Self::make(|| bridge::make_revolve(&origin, &axis, profile.as_flattened()))
@@ -314,9 +332,11 @@ impl Shape {
         Ok(out)
     }
 
-    /// Reads a STEP file; units become mm.
+    /// Reads a STEP file; units become mm. Cut off files and dangling references are found before the kernel sees them.
     pub fn read_step(path: &Path) -> Result<Self> {
         let text = path_text(path)?;
+        let bytes = std::fs::read(path).map_err(|e| OcctError(e.to_string()))?;
+        step_text::check(&bytes).map_err(OcctError)?;
         Self::make(|| bridge::read_step(text))
     }
 
@@ -372,16 +392,31 @@ impl Shape {
             Operation::Common => 2,
         };
         let guard = lock();
-        let done = bridge::boolean(code, &self.0, &tools.0, fuzzy, with_common, &ffi::Interrupt(interrupt))?;
+        let done = bridge::boolean(
+            code,
+            &self.0,
+            &tools.0,
+            fuzzy,
+            with_common,
+            &ffi::Interrupt(interrupt),
+        )?;
         let shape = bridge::boolean_result(&done)?;
-        let common = if with_common { Some(bridge::boolean_common(&done)?) } else { None };
+        let common = if with_common {
+            Some(bridge::boolean_common(&done)?)
+        } else {
+            None
+        };
         let warnings = bridge::boolean_warnings(&done);
         let origins = bridge::boolean_origins(&done);
         drop(guard);
         Ok(BooleanResult {
             shape: Shape(shape),
             common: common.map(Shape),
-            warnings: warnings.lines().map(|l| l.trim().to_owned()).filter(|l| !l.is_empty()).collect(),
+            warnings: warnings
+                .lines()
+                .map(|l| l.trim().to_owned())
+                .filter(|l| !l.is_empty())
+                .collect(),
             origins: origins.iter().map(|&code| origin(code)).collect(),
         })
     }
@@ -402,7 +437,9 @@ impl Shape {
     /// All solids in it.
     pub fn solids(&self) -> Result<Vec<Shape>> {
         let n = self.counts()?.solids as usize;
-        (0..n).map(|i| Self::make(|| bridge::solid(&self.0, i))).collect()
+        (0..n)
+            .map(|i| Self::make(|| bridge::solid(&self.0, i)))
+            .collect()
     }
 
     /// Volume to the relative accuracy `eps`, mm3.
@@ -446,7 +483,10 @@ impl Shape {
 
     /// Where lines meet the faces: for each line the sorted parameters.
     pub fn line_hits(&self, lines: &[Line]) -> Result<Vec<Vec<f64>>> {
-        let flat: Vec<f64> = lines.iter().flat_map(|l| [l.point, l.direction].concat().into_iter().chain(l.range)).collect();
+        let flat: Vec<f64> = lines
+            .iter()
+            .flat_map(|l| [l.point, l.direction].concat().into_iter().chain(l.range))
+            .collect();
         check_finite(&flat)?;
         let _guard = lock();
         let mut out = vec![Vec::new(); lines.len()];
@@ -489,8 +529,16 @@ impl Shape {
         let _guard = lock();
         let flat = bridge::tessellate(&self.0, chord, angle)?;
         Ok(Triangulation {
-            points: flat.points.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect(),
-            triangles: flat.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+            points: flat
+                .points
+                .chunks_exact(3)
+                .map(|p| [p[0], p[1], p[2]])
+                .collect(),
+            triangles: flat
+                .triangles
+                .chunks_exact(3)
+                .map(|t| [t[0], t[1], t[2]])
+                .collect(),
             faces: flat.faces,
         })
     }
@@ -507,10 +555,21 @@ fn origin(code: i32) -> Origin {
 fn face(info: &bridge::FaceInfo) -> Face {
     let surface = match info.kind {
         0 => Surface::Plane,
-        1 => Surface::Cylinder { radius: info.radius, concave: info.concave },
-        2 => Surface::Cone { radius: info.radius, half_angle: info.minor },
-        3 => Surface::Sphere { radius: info.radius },
-        4 => Surface::Torus { major: info.radius, minor: info.minor },
+        1 => Surface::Cylinder {
+            radius: info.radius,
+            concave: info.concave,
+        },
+        2 => Surface::Cone {
+            radius: info.radius,
+            half_angle: info.minor,
+        },
+        3 => Surface::Sphere {
+            radius: info.radius,
+        },
+        4 => Surface::Torus {
+            major: info.radius,
+            minor: info.minor,
+        },
         _ => Surface::Free,
     };
     Face {
@@ -536,7 +595,8 @@ fn edge(info: &bridge::EdgeInfo) -> Edge {
 }
 
 fn path_text(path: &Path) -> Result<&str> {
-    path.to_str().ok_or_else(|| OcctError(format!("the path {} is not valid Unicode", path.display())))
+    path.to_str()
+        .ok_or_else(|| OcctError(format!("the path {} is not valid Unicode", path.display())))
 }
 
 fn check_finite(values: &[f64]) -> Result<()> {
@@ -552,17 +612,26 @@ fn check_description(brep: &BrepDescription) -> Result<()> {
     let vertices = brep.vertices.len() / 3;
     let edges = brep.edges.chunks_exact(3);
     let faces = brep.faces.chunks_exact(3);
-    if !brep.vertices.len().is_multiple_of(3) || !edges.remainder().is_empty() || !faces.remainder().is_empty() {
+    if !brep.vertices.len().is_multiple_of(3)
+        || !edges.remainder().is_empty()
+        || !faces.remainder().is_empty()
+    {
         return fail("an array has a broken length");
     }
-    if edges.clone().any(|e| e[0] as usize >= vertices || e[1] as usize >= vertices || e[2] == 0) {
+    if edges
+        .clone()
+        .any(|e| e[0] as usize >= vertices || e[1] as usize >= vertices || e[2] == 0)
+    {
         return fail("an edge names a missing vertex or has no span");
     }
     if faces.clone().any(|f| f[0] == 0 || f[1] == 0) {
         return fail("a face has no span");
     }
     let edge_control: usize = edges.clone().map(|e| 4 * e[2] as usize + 2).sum();
-    let face_control: usize = faces.clone().map(|f| (4 * f[0] as usize + 2) * (4 * f[1] as usize + 2)).sum();
+    let face_control: usize = faces
+        .clone()
+        .map(|f| (4 * f[0] as usize + 2) * (4 * f[1] as usize + 2))
+        .sum();
     let uses: usize = faces.clone().map(|f| f[2] as usize).sum();
     if brep.edge_control.len() != 3 * edge_control || brep.face_control.len() != 3 * face_control {
         return fail("the number of control points does not fit the spans");
@@ -570,13 +639,30 @@ fn check_description(brep: &BrepDescription) -> Result<()> {
     if brep.uses.len() != 2 * uses || brep.use_uv.len() != 4 * uses {
         return fail("the number of edge uses does not fit the faces");
     }
-    if brep.uses.chunks_exact(2).any(|u| u[0] as usize >= edges.len()) {
+    if brep
+        .uses
+        .chunks_exact(2)
+        .any(|u| u[0] as usize >= edges.len())
+    {
         return fail("a use names a missing edge");
     }
-    if brep.solids.iter().flatten().flatten().any(|&f| f as usize >= faces.len()) {
+    if brep
+        .solids
+        .iter()
+        .flatten()
+        .flatten()
+        .any(|&f| f as usize >= faces.len())
+    {
         return fail("a shell names a missing face");
     }
-    [&brep.vertices, &brep.edge_control, &brep.face_control, &brep.use_uv].into_iter().try_for_each(|v| check_finite(v))
+    [
+        &brep.vertices,
+        &brep.edge_control,
+        &brep.face_control,
+        &brep.use_uv,
+    ]
+    .into_iter()
+    .try_for_each(|v| check_finite(v))
 }
 
 #[cfg(test)]
@@ -595,7 +681,11 @@ mod tests {
         assert_eq!(c.faults()?, None);
         let faces = c.faces()?;
         assert_eq!(faces.len(), 3);
-        assert!(faces.iter().any(|f| f.surface == Surface::Cylinder { radius: 2.0, concave: false }));
+        assert!(faces.iter().any(|f| f.surface
+            == Surface::Cylinder {
+                radius: 2.0,
+                concave: false
+            }));
         Ok(())
     }
 
@@ -606,13 +696,37 @@ mod tests {
         let cut = cube.boolean(Operation::Cut, &bore, 1e-5, true, &never)?;
         let pi = std::f64::consts::PI;
         assert!((cut.shape.volume(1e-9)? - (64.0 - 4.0 * pi)).abs() < 1e-6);
-        assert!((cut.common.as_ref().map(|c| c.volume(1e-9)).transpose()?.unwrap_or(0.0) - 4.0 * pi).abs() < 1e-6);
+        assert!(
+            (cut.common
+                .as_ref()
+                .map(|c| c.volume(1e-9))
+                .transpose()?
+                .unwrap_or(0.0)
+                - 4.0 * pi)
+                .abs()
+                < 1e-6
+        );
         assert!(cut.warnings.is_empty());
         let faces = cut.shape.faces()?;
-        let wall = faces.iter().position(|f| matches!(f.surface, Surface::Cylinder { concave: true, .. }));
-        assert!(matches!(wall.map(|w| cut.origins[w]), Some(Origin::Tool(_))));
-        assert_eq!(cut.origins.iter().filter(|o| matches!(o, Origin::Object(_))).count(), 6);
-        let hits = cut.shape.line_hits(&[Line { point: [2.0, 2.0, 0.0], direction: [0.0, 0.0, 1.0], range: [-9.0, 9.0] }])?;
+        let wall = faces
+            .iter()
+            .position(|f| matches!(f.surface, Surface::Cylinder { concave: true, .. }));
+        assert!(matches!(
+            wall.map(|w| cut.origins[w]),
+            Some(Origin::Tool(_))
+        ));
+        assert_eq!(
+            cut.origins
+                .iter()
+                .filter(|o| matches!(o, Origin::Object(_)))
+                .count(),
+            6
+        );
+        let hits = cut.shape.line_hits(&[Line {
+            point: [2.0, 2.0, 0.0],
+            direction: [0.0, 0.0, 1.0],
+            range: [-9.0, 9.0],
+        }])?;
         assert!(hits[0].is_empty());
         assert!(cut.shape.contains([0.5, 0.5, 0.5])? && !cut.shape.contains([2.0, 2.0, 2.0])?);
         Ok(())
@@ -622,7 +736,10 @@ mod tests {
     fn interrupted_boolean_is_an_error() -> Result<()> {
         let cube = Shape::cuboid([0.0; 3], [4.0; 3])?;
         let other = cube.translated([1.0, 1.0, 1.0])?;
-        assert!(cube.boolean(Operation::Fuse, &other, 1e-5, false, &|| true).is_err());
+        assert!(
+            cube.boolean(Operation::Fuse, &other, 1e-5, false, &|| true)
+                .is_err()
+        );
         Ok(())
     }
 
@@ -630,7 +747,9 @@ mod tests {
     fn triangulation_is_watertight() -> Result<()> {
         let cube = Shape::cuboid([0.0; 3], [4.0; 3])?;
         let bore = Shape::cylinder([2.0, 2.0, -1.0], [0.0, 0.0, 1.0], 1.0, 6.0)?;
-        let cut = cube.boolean(Operation::Cut, &bore, 1e-5, false, &never)?.shape;
+        let cut = cube
+            .boolean(Operation::Cut, &bore, 1e-5, false, &never)?
+            .shape;
         let mesh = cut.tessellate(0.01, 0.1)?;
         let mut edges = std::collections::BTreeMap::new();
         for t in &mesh.triangles {
@@ -638,18 +757,31 @@ mod tests {
                 *edges.entry((t[k], t[(k + 1) % 3])).or_insert(0) += 1;
             }
         }
-        assert!(edges.iter().all(|(&(a, b), &n)| n == 1 && edges.get(&(b, a)) == Some(&1)));
+        assert!(
+            edges
+                .iter()
+                .all(|(&(a, b), &n)| n == 1 && edges.get(&(b, a)) == Some(&1))
+        );
         assert_eq!(mesh, cut.tessellate(0.01, 0.1)?);
         Ok(())
     }
 
     #[test]
     fn revolve_and_facets() -> Result<()> {
-        let ring = Shape::revolve([0.0; 3], [1.0, 0.0, 0.0], &[[3.0, 0.0], [5.0, 0.0], [5.0, 2.0], [3.0, 2.0]])?;
+        let ring = Shape::revolve(
+            [0.0; 3],
+            [1.0, 0.0, 0.0],
+            &[[3.0, 0.0], [5.0, 0.0], [5.0, 2.0], [3.0, 2.0]],
+        )?;
         let exact = std::f64::consts::PI * 32.0;
         assert!((ring.volume(1e-9)? - exact).abs() < 1e-9 * exact);
         assert_eq!((ring.faults()?, ring.counts()?.faces), (None, 4));
-        let p = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let p = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+        ];
         let tetra = Shape::from_triangles(&p, &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])?;
         assert_eq!(tetra.faults()?, None);
         assert!((tetra.volume(1e-9)? - 1.0 / 6.0).abs() < 1e-12);
@@ -661,7 +793,10 @@ mod tests {
         assert!(Shape::cylinder([0.0; 3], [0.0; 3], 1.0, 1.0).is_err());
         assert!(Shape::cylinder([0.0; 3], [0.0, 0.0, f64::NAN], 1.0, 1.0).is_err());
         assert!(Shape::read_step(Path::new("/nowhere/missing.step")).is_err());
-        let broken = BrepDescription { edges: vec![0, 1, 1], ..BrepDescription::default() };
+        let broken = BrepDescription {
+            edges: vec![0, 1, 1],
+            ..BrepDescription::default()
+        };
         assert!(Shape::from_brep(&broken).is_err());
     }
 }

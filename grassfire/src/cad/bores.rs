@@ -46,11 +46,19 @@ impl Bore {
 
     /// The hole and what is kept free beyond its open ends.
     pub(crate) fn tool(&self) -> Result<Shape, OcctError> {
-        self.cylinder([self.extent[0] - self.extension[0], self.extent[1] + self.extension[1]])
+        self.cylinder([
+            self.extent[0] - self.extension[0],
+            self.extent[1] + self.extension[1],
+        ])
     }
 
     fn cylinder(&self, [from, to]: [f64; 2]) -> Result<Shape, OcctError> {
-        Shape::cylinder(array(self.at(from)), array(self.direction), self.radius, to - from)
+        Shape::cylinder(
+            array(self.at(from)),
+            array(self.direction),
+            self.radius,
+            to - from,
+        )
     }
 
     fn at(&self, t: f64) -> Vec3 {
@@ -59,7 +67,11 @@ impl Bore {
 
     /// The axis and eight lines parallel to it near the wall, over `range` along the axis.
     pub(crate) fn lines(&self, range: [f64; 2]) -> Vec<Line> {
-        let side = if self.direction.x.abs() < 0.8 { Vec3::x() } else { Vec3::y() };
+        let side = if self.direction.x.abs() < 0.8 {
+            Vec3::x()
+        } else {
+            Vec3::y()
+        };
         let e1 = self.direction.cross(&side).normalize();
         let e2 = self.direction.cross(&e1);
         let ring = (0..8).map(|k| {
@@ -69,14 +81,21 @@ impl Bore {
         });
         std::iter::once(Vec3::zeros())
             .chain(ring)
-            .map(|offset| Line { point: array(self.origin + offset), direction: array(self.direction), range })
+            .map(|offset| Line {
+                point: array(self.origin + offset),
+                direction: array(self.direction),
+                range,
+            })
             .collect()
     }
 
     /// What is to be free of material: the wall's length and the extensions, a hair inside closed ends.
     pub(crate) fn free_range(&self) -> [f64; 2] {
         let hair = PROBE * self.radius;
-        [self.extent[0] - self.extension[0] + hair, self.extent[1] + self.extension[1] - hair]
+        [
+            self.extent[0] - self.extension[0] + hair,
+            self.extent[1] + self.extension[1] - hair,
+        ]
     }
 }
 
@@ -88,7 +107,13 @@ impl Bore {
 pub(crate) fn find(shape: &Shape) -> Result<Vec<Bore>, OcctError> {
     let mut bores: Vec<(Bore, f64)> = Vec::new();
     for face in shape.faces()? {
-        let Surface::Cylinder { radius, concave: true } = face.surface else { continue };
+        let Surface::Cylinder {
+            radius,
+            concave: true,
+        } = face.surface
+        else {
+            continue;
+        };
         let piece = piece(&face, radius);
         match bores.iter_mut().find(|(bore, _)| same_hole(bore, &piece)) {
             Some((bore, angle)) => {
@@ -101,7 +126,11 @@ pub(crate) fn find(shape: &Shape) -> Result<Vec<Bore>, OcctError> {
         }
     }
     let full = |angle: f64| angle > std::f64::consts::TAU - 1e-2;
-    let mut out: Vec<Bore> = bores.into_iter().filter(|(_, angle)| full(*angle)).map(|(bore, _)| bore).collect();
+    let mut out: Vec<Bore> = bores
+        .into_iter()
+        .filter(|(_, angle)| full(*angle))
+        .map(|(bore, _)| bore)
+        .collect();
     for bore in &mut out {
         bore.open = open_ends(bore, shape)?;
     }
@@ -111,7 +140,11 @@ pub(crate) fn find(shape: &Shape) -> Result<Vec<Bore>, OcctError> {
 fn piece(face: &Face, radius: f64) -> Bore {
     let axis = Vec3::from(face.axis);
     let flip = axis[axis.iamax()] < 0.0;
-    let extent = if flip { [-face.v[1], -face.v[0]] } else { face.v };
+    let extent = if flip {
+        [-face.v[1], -face.v[0]]
+    } else {
+        face.v
+    };
     Bore {
         origin: face.origin.into(),
         direction: if flip { -axis } else { axis },
@@ -136,7 +169,10 @@ fn same_hole(a: &Bore, b: &Bore) -> bool {
 fn open_ends(bore: &Bore, shape: &Shape) -> Result<[bool; 2], OcctError> {
     let beyond = PROBE * bore.radius;
     let mut open = [true; 2];
-    for (end, t) in [bore.extent[0] - beyond, bore.extent[1] + beyond].into_iter().enumerate() {
+    for (end, t) in [bore.extent[0] - beyond, bore.extent[1] + beyond]
+        .into_iter()
+        .enumerate()
+    {
         for line in bore.lines([0.0, 1.0]) {
             if shape.contains(array(Vec3::from(line.point) + bore.direction * t))? {
                 open[end] = false;
@@ -157,11 +193,19 @@ pub(crate) fn extend(bore: &mut Bore, factor: f64, obstacles: &[&Shape]) -> Resu
             continue;
         }
         let (t, sign) = (bore.extent[end], if end == 0 { -1.0 } else { 1.0 });
-        let range = if end == 0 { [t - wanted, t - beyond] } else { [t + beyond, t + wanted] };
+        let range = if end == 0 {
+            [t - wanted, t - beyond]
+        } else {
+            [t + beyond, t + wanted]
+        };
         let mut free = wanted;
         for obstacle in obstacles {
             let hits = obstacle.line_hits(&bore.lines(range))?;
-            let nearest = hits.iter().flatten().map(|hit| (hit - t) * sign).fold(f64::MAX, f64::min);
+            let nearest = hits
+                .iter()
+                .flatten()
+                .map(|hit| (hit - t) * sign)
+                .fold(f64::MAX, f64::min);
             free = free.min(0.9 * nearest);
         }
         bore.extension[end] = free;

@@ -8,13 +8,10 @@ use super::bores::{self, Bore};
 use super::inspect::{self, NonDesignResult};
 use super::non_design::NonDesignBody;
 use super::reference::{self, Probe};
-use super::{CadError, CadOptions, array, patches, shells};
+use super::{CadError, CadOptions, array, patches, shells, split};
 use crate::Vec3;
 use crate::monitor::Monitor;
-use crate::spline::Brep;
-
-/// Makes the same body with one face a quad: more faces, but booleans that fail on merged faces can work on them.
-pub type QuadsBrep<'a> = &'a dyn Fn() -> Result<Brep, String>;
+use crate::spline::{Brep, BrepFace};
 
 /// Where a face of the part comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,8 +76,8 @@ const REGION_TOLERANCE: f64 = 0.01;
 /// 2. Fuse all non-design bodies with their bores filled, then cut the bores: organic material never stays in a bore.
 /// 3. Check the union: no warnings, BRepCheck, closed, number of solids, inclusion-exclusion to 1e-6, and the volume,
 ///    the common part, the removed part and each body's region against ray integrals that use no boolean.
-/// 4. When a check fails: larger fuzzy value, faces per quad, a small shift, one body at a time; at last the bodies side by
-///    side with `valid = false`.
+/// 4. When a check fails: faces near the non-design bodies cut into single polynomials, then also a larger fuzzy value, a
+///    small shift of the fitted body, one body at a time; at last the bodies side by side with `valid = false`.
 ///
 /// # Errors
 /// [`CadError::BadBrep`], [`CadError::MisplacedShell`], [`CadError::Kernel`] when the body itself cannot be built, and
@@ -89,46 +86,89 @@ pub fn build(
     brep: &Brep,
     bodies: &[NonDesignBody],
     options: &CadOptions,
-    quads: Option<QuadsBrep>,
     monitor: &Monitor,
 ) -> Result<CadSolid, CadError> {
     monitor.step(STAGE, "building faces", 0.0)?;
     let body = Body::new(brep)?;
     let mut messages: Vec<String> = body.problems.clone();
-    if !messages.is_empty() || bodies.is_empty() {
+    let sound = messages.is_empty();
+    if !sound || bodies.is_empty() {
         let sources = vec![FaceSource::Organic; brep.faces.len()];
-        let shape = if bodies.is_empty() { single(body.shape)? } else { side_by_side(&body.shape, bodies)? };
-        let context = inspect::Context { bodies, options, probes: &[], reference: brep.volume };
-        let sources = if bodies.is_empty() { sources } else { inspect::separate_sources(&sources, bodies)? };
-        return inspect::report(shape, sources, messages, &context, monitor);
+        let shape = if bodies.is_empty() {
+            single(body.shape)?
+        } else {
+            side_by_side(&body.shape, bodies)?
+        };
+        let context = inspect::Context {
+            bodies,
+            options,
+            probes: &[],
+            reference: brep.volume,
+        };
+        let sources = if bodies.is_empty() {
+            sources
+        } else {
+            inspect::separate_sources(&sources, bodies)?
+        };
+        return inspect::report(shape, sources, messages, sound, &context, monitor);
     }
     let bodies_holes = free_bores(bodies)?;
-    let tools: Vec<Option<Shape>> = bodies_holes.iter().map(|bores| tool(bores)).collect::<Result<_, _>>()?;
+    let tools: Vec<Option<Shape>> = bodies_holes
+        .iter()
+        .map(|bores| tool(bores))
+        .collect::<Result<_, _>>()?;
     let probes = reference::probes(brep, bodies, &tools, options.rays, monitor)?;
-    let reference = brep.volume + probes.iter().map(|p| p.part_volume - p.organic_volume).sum::<f64>();
-    let inputs = Inputs { bosses: disjoint(bodies.iter().map(|b| &b.boss), options)?, tools: disjoint(tools.iter().flatten(), options)? };
-    let context = inspect::Context { bodies, options, probes: &probes, reference };
+    let reference = brep.volume
+        + probes
+            .iter()
+            .map(|p| p.part_volume - p.organic_volume)
+            .sum::<f64>();
+    let inputs = Inputs {
+        bosses: disjoint(bodies.iter().map(|b| &b.boss), options)?,
+        tools: disjoint(tools.iter().flatten(), options)?,
+    };
+    let context = inspect::Context {
+        bodies,
+        options,
+        probes: &probes,
+        reference,
+    };
 
+    let mut split_body = None;
     for attempt in ATTEMPTS {
-        monitor.step(STAGE, attempt.text(), 0.3)?;
-        let outcome = attempt.run(brep, &body, &inputs, quads, &context, monitor);
+        monitor.step(STAGE, attempt.text, 0.3)?;
+        let body = match (&mut split_body, attempt.split) {
+            (_, false) => &body,
+            (Some(split), true) => split,
+            (none, true) => none.insert(Body::new(&split::split(
+                brep,
+                &near(brep, bodies, &tools)?,
+            ))?),
+        };
+        let outcome = attempt.run(body, &inputs, &context, monitor);
         monitor.check()?;
         match outcome {
             Ok(united) => {
-                if let Some(text) = attempt.note() {
-                    messages.push(format!("the union worked {text}"));
+                if !messages.is_empty() {
+                    messages.push(format!("passed: {}", attempt.text));
                 }
                 monitor.step(STAGE, "inspecting", 0.8)?;
-                return inspect::report(united.shape, inspect::sources(&united.mesh_shape, &united.kinds, &context)?, messages, &context, monitor);
+                let sources = inspect::sources(&united.mesh_shape, &united.kinds, &context)?;
+                return inspect::report(united.shape, sources, messages, true, &context, monitor);
             }
-            Err(reason) => messages.push(format!("{}: {reason}", attempt.text())),
+            Err(reason) => messages.push(format!("{} failed: {reason}", attempt.text)),
         }
     }
     messages.push("no union passed its checks; the fitted body and the non-design bodies are written side by side".into());
     let sources = inspect::separate_sources(&vec![FaceSource::Organic; brep.faces.len()], bodies)?;
-    let mut out = inspect::report(side_by_side(&body.shape, bodies)?, sources, messages, &context, monitor)?;
-    out.valid = false;
-    Ok(out)
+    inspect::report(
+        side_by_side(&body.shape, bodies)?,
+        sources,
+        messages,
+        false,
+        &context,
+        monitor,
+    )
 }
 
 /// The fitted body as solids.
@@ -151,13 +191,24 @@ impl Body {
         }
         let counts = shape.counts()?;
         if counts.bad_edges > 0 {
-            problems.push(format!("{} edges of the fitted body have not exactly two faces", counts.bad_edges));
+            problems.push(format!(
+                "{} edges of the fitted body have not exactly two faces",
+                counts.bad_edges
+            ));
         }
         let difference = (volume - brep.volume).abs() / brep.volume.abs();
         if difference.is_nan() || difference > IDENTITY {
-            problems.push(format!("the fitted body has {volume:.6} mm3, its patches {:.6} mm3", brep.volume));
+            problems.push(format!(
+                "the fitted body has {volume:.6} mm3, its patches {:.6} mm3",
+                brep.volume
+            ));
         }
-        Ok(Self { shape, solids: solids.len() as u32, volume, problems })
+        Ok(Self {
+            shape,
+            solids: solids.len() as u32,
+            volume,
+            problems,
+        })
     }
 }
 
@@ -165,20 +216,45 @@ fn describe(brep: &Brep, solids: &[Vec<usize>]) -> BrepDescription {
     let flat = |points: &[Vec3]| points.iter().flat_map(|p| array(*p)).collect::<Vec<f64>>();
     BrepDescription {
         vertices: flat(&brep.vertices),
-        edges: brep.edges.iter().flat_map(|e| [e.vertices[0], e.vertices[1], e.spans]).collect(),
+        edges: brep
+            .edges
+            .iter()
+            .flat_map(|e| [e.vertices[0], e.vertices[1], e.spans])
+            .collect(),
         edge_control: brep.edges.iter().flat_map(|e| flat(&e.control)).collect(),
-        faces: brep.faces.iter().flat_map(|f| [f.spans[0], f.spans[1], f.uses.len() as u32]).collect(),
+        faces: brep
+            .faces
+            .iter()
+            .flat_map(|f| [f.spans[0], f.spans[1], f.uses.len() as u32])
+            .collect(),
         face_control: brep.faces.iter().flat_map(|f| flat(&f.control)).collect(),
-        uses: brep.faces.iter().flat_map(|f| &f.uses).flat_map(|u| [u.edge, u32::from(u.reversed)]).collect(),
-        use_uv: brep.faces.iter().flat_map(|f| &f.uses).flat_map(|u| [u.start[0], u.start[1], u.end[0], u.end[1]]).collect(),
-        solids: solids.iter().map(|s| s.iter().map(|&k| brep.shells[k].clone()).collect()).collect(),
+        uses: brep
+            .faces
+            .iter()
+            .flat_map(|f| &f.uses)
+            .flat_map(|u| [u.edge, u32::from(u.reversed)])
+            .collect(),
+        use_uv: brep
+            .faces
+            .iter()
+            .flat_map(|f| &f.uses)
+            .flat_map(|u| [u.start[0], u.start[1], u.end[0], u.end[1]])
+            .collect(),
+        solids: solids
+            .iter()
+            .map(|s| s.iter().map(|&k| brep.shells[k].clone()).collect())
+            .collect(),
     }
 }
 
 /// A compound of one solid is that solid.
 fn single(shape: Shape) -> Result<Shape, OcctError> {
     let mut solids = shape.solids()?;
-    Ok(if solids.len() == 1 { solids.swap_remove(0) } else { shape })
+    Ok(if solids.len() == 1 {
+        solids.swap_remove(0)
+    } else {
+        shape
+    })
 }
 
 fn side_by_side(body: &Shape, bodies: &[NonDesignBody]) -> Result<Shape, OcctError> {
@@ -194,30 +270,48 @@ fn free_bores(bodies: &[NonDesignBody]) -> Result<Vec<Vec<Bore>>, OcctError> {
         bores::extend(&mut bore, factor, &solids)?;
         Ok(bore)
     };
-    bodies.iter().map(|b| b.bores.iter().map(free).collect()).collect()
+    bodies
+        .iter()
+        .map(|b| b.bores.iter().map(free).collect())
+        .collect()
 }
 
 fn tool(bores: &[Bore]) -> Result<Option<Shape>, OcctError> {
     let tools: Vec<Shape> = bores.iter().map(Bore::tool).collect::<Result<_, _>>()?;
-    if tools.is_empty() { Ok(None) } else { Shape::compound(&tools).map(Some) }
+    if tools.is_empty() {
+        Ok(None)
+    } else {
+        Shape::compound(&tools).map(Some)
+    }
 }
 
 /// One compound of solids that do not overlap: those whose boxes meet are fused first, so that volumes add up.
-fn disjoint<'a>(shapes: impl Iterator<Item = &'a Shape>, options: &CadOptions) -> Result<Option<Shape>, OcctError> {
+fn disjoint<'a>(
+    shapes: impl Iterator<Item = &'a Shape>,
+    options: &CadOptions,
+) -> Result<Option<Shape>, OcctError> {
     let mut groups: Vec<(Shape, [[f64; 3]; 2])> = Vec::new();
     for shape in shapes {
         for solid in shape.solids()? {
             let mut merged = solid;
             let mut bounds = merged.bounds()?;
-            while let Some(k) = groups.iter().position(|(_, other)| (0..3).all(|d| other[0][d] <= bounds[1][d] && bounds[0][d] <= other[1][d])) {
+            while let Some(k) = groups.iter().position(|(_, other)| {
+                (0..3).all(|d| other[0][d] <= bounds[1][d] && bounds[0][d] <= other[1][d])
+            }) {
                 let (other, _) = groups.remove(k);
-                merged = other.boolean(Operation::Fuse, &merged, options.fuzzy, false, &|| false)?.shape;
+                merged = other
+                    .boolean(Operation::Fuse, &merged, options.fuzzy, false, &|| false)?
+                    .shape;
                 bounds = merged.bounds()?;
             }
             groups.push((merged, bounds));
         }
     }
-    if groups.is_empty() { Ok(None) } else { Shape::compound(groups.iter().map(|(s, _)| s)).map(Some) }
+    if groups.is_empty() {
+        Ok(None)
+    } else {
+        Shape::compound(groups.iter().map(|(s, _)| s)).map(Some)
+    }
 }
 
 struct Inputs {
@@ -241,68 +335,111 @@ pub(crate) struct United {
     kinds: Vec<Kind>,
 }
 
+/// One way to make the union.
 #[derive(Debug, Clone, Copy)]
-enum Attempt {
-    Plain,
-    Fuzzy,
-    Quads,
-    Shift,
-    OneByOne,
+struct Attempt {
+    text: &'static str,
+    /// Faces near the non-design bodies are single polynomials.
+    split: bool,
+    larger_fuzzy: bool,
+    shift: bool,
+    one_by_one: bool,
 }
 
-const ATTEMPTS: [Attempt; 5] = [Attempt::Plain, Attempt::Fuzzy, Attempt::Quads, Attempt::Shift, Attempt::OneByOne];
+const PLAIN: Attempt = Attempt {
+    text: "union of all bodies",
+    split: false,
+    larger_fuzzy: false,
+    shift: false,
+    one_by_one: false,
+};
+const SPLIT: Attempt = Attempt {
+    text: "union with smaller faces near the non-design bodies",
+    split: true,
+    ..PLAIN
+};
+const ATTEMPTS: [Attempt; 5] = [
+    PLAIN,
+    SPLIT,
+    Attempt {
+        text: "union with smaller faces and a larger fuzzy value",
+        larger_fuzzy: true,
+        ..SPLIT
+    },
+    Attempt {
+        text: "union with smaller faces after a small shift of the fitted body",
+        shift: true,
+        ..SPLIT
+    },
+    Attempt {
+        text: "union with smaller faces, one body at a time",
+        one_by_one: true,
+        ..SPLIT
+    },
+];
 
 impl Attempt {
-    fn text(self) -> &'static str {
-        match self {
-            Self::Plain => "uniting all bodies",
-            Self::Fuzzy => "uniting with a larger fuzzy value",
-            Self::Quads => "uniting with one face a quad",
-            Self::Shift => "uniting after a small shift of the fitted body",
-            Self::OneByOne => "uniting one body at a time",
-        }
-    }
-
-    fn note(self) -> Option<&'static str> {
-        match self {
-            Self::Plain => None,
-            Self::Fuzzy => Some("with a larger fuzzy value"),
-            Self::Quads => Some("with one face a quad"),
-            Self::Shift => Some("after a small shift of the fitted body"),
-            Self::OneByOne => Some("one body at a time"),
-        }
-    }
-
     fn run(
         self,
-        brep: &Brep,
         body: &Body,
         inputs: &Inputs,
-        quads: Option<QuadsBrep>,
         context: &inspect::Context,
         monitor: &Monitor,
     ) -> Result<United, String> {
         let options = context.options;
-        let unite = |body: &Body, fuzzy| unite(body, inputs, fuzzy, false, context, monitor);
-        match self {
-            Self::Plain => unite(body, options.fuzzy),
-            Self::Fuzzy => unite(body, options.fuzzy_retry),
-            Self::Quads => {
-                let brep = quads.ok_or("no description with one face a quad was given")?()?;
-                let body = Body::new(&brep).map_err(|e| e.to_string())?;
-                match body.problems.first() {
-                    Some(problem) => Err(problem.clone()),
-                    None => unite(&body, options.fuzzy),
-                }
-            }
-            Self::Shift => {
-                let by = Vec3::new(0.6, 0.48, 0.64) * options.shift;
-                let shape = body.shape.translated(array(by)).map_err(|e| e.0)?;
-                unite(&Body { shape, problems: Vec::new(), volume: brep.volume, ..*body }, options.fuzzy)
-            }
-            Self::OneByOne => super::build::unite(body, inputs, options.fuzzy, true, context, monitor),
+        let fuzzy = if self.larger_fuzzy {
+            options.fuzzy_retry
+        } else {
+            options.fuzzy
+        };
+        if let Some(problem) = body.problems.first() {
+            return Err(problem.clone());
         }
+        if !self.shift {
+            return unite(body, inputs, fuzzy, self.one_by_one, context, monitor);
+        }
+        let by = Vec3::new(0.6, 0.48, 0.64) * options.shift;
+        let shape = body.shape.translated(array(by)).map_err(|e| e.0)?;
+        unite(
+            &Body {
+                shape,
+                problems: Vec::new(),
+                ..*body
+            },
+            inputs,
+            fuzzy,
+            self.one_by_one,
+            context,
+            monitor,
+        )
     }
+}
+
+/// Faces whose control points come near a non-design body or its tools.
+fn near(
+    brep: &Brep,
+    bodies: &[NonDesignBody],
+    tools: &[Option<Shape>],
+) -> Result<Vec<bool>, OcctError> {
+    let margin = Vec3::repeat(0.5);
+    let shapes = bodies.iter().map(|b| &b.boss).chain(tools.iter().flatten());
+    let boxes: Vec<(Vec3, Vec3)> = shapes
+        .map(|s| {
+            s.bounds()
+                .map(|[lo, hi]| (Vec3::from(lo) - margin, Vec3::from(hi) + margin))
+        })
+        .collect::<Result<_, _>>()?;
+    let meets = |face: &BrepFace| {
+        let first = face.control[0];
+        let (lo, hi) = face
+            .control
+            .iter()
+            .fold((first, first), |(lo, hi), p| (lo.inf(p), hi.sup(p)));
+        boxes
+            .iter()
+            .any(|(a, b)| (0..3).all(|d| a[d] <= hi[d] && lo[d] <= b[d]))
+    };
+    Ok(brep.faces.iter().map(meets).collect())
 }
 
 /// Running result of the booleans.
@@ -316,11 +453,25 @@ struct Progress<'a> {
 
 impl Progress<'_> {
     fn apply(&mut self, operation: Operation, tool: &Shape) -> Result<(), String> {
-        let kind = if operation == Operation::Cut { Kind::Bore } else { Kind::Boss };
-        let BooleanResult { shape, common, warnings, origins } =
-            self.shape.boolean(operation, tool, self.fuzzy, true, self.interrupt).map_err(|e| e.0)?;
+        let kind = if operation == Operation::Cut {
+            Kind::Bore
+        } else {
+            Kind::Boss
+        };
+        let BooleanResult {
+            shape,
+            common,
+            warnings,
+            origins,
+        } = self
+            .shape
+            .boolean(operation, tool, self.fuzzy, true, self.interrupt)
+            .map_err(|e| e.0)?;
         if let Some(first) = warnings.first() {
-            return Err(format!("the kernel warned: {first} ({} lines)", warnings.len()));
+            return Err(format!(
+                "the kernel warned: {first} ({} lines)",
+                warnings.len()
+            ));
         }
         if let Some(common) = common {
             if common.counts().map_err(|e| e.0)?.solids > 0 {
@@ -337,23 +488,46 @@ impl Progress<'_> {
     }
 }
 
-fn unite(body: &Body, inputs: &Inputs, fuzzy: f64, one_by_one: bool, context: &inspect::Context, monitor: &Monitor) -> Result<United, String> {
+fn unite(
+    body: &Body,
+    inputs: &Inputs,
+    fuzzy: f64,
+    one_by_one: bool,
+    context: &inspect::Context,
+    monitor: &Monitor,
+) -> Result<United, String> {
     let text = |e: OcctError| e.0;
     let start = Instant::now();
     let limit = context.options.boolean_seconds;
     let interrupt = move || monitor.check().is_err() || start.elapsed().as_secs_f64() > limit;
     let faces = body.shape.counts().map_err(text)?.faces as usize;
-    let mut at = Progress { shape: body.shape.share().map_err(text)?, kinds: vec![Kind::Organic; faces], common: 0.0, fuzzy, interrupt: &interrupt };
+    let mut at = Progress {
+        shape: body.shape.share().map_err(text)?,
+        kinds: vec![Kind::Organic; faces],
+        common: 0.0,
+        fuzzy,
+        interrupt: &interrupt,
+    };
     let mut commons = [0.0; 2];
     let mut bosses = 0.0;
-    for (k, (operation, tools)) in [(Operation::Fuse, &inputs.bosses), (Operation::Cut, &inputs.tools)].into_iter().enumerate() {
+    for (k, (operation, tools)) in [
+        (Operation::Fuse, &inputs.bosses),
+        (Operation::Cut, &inputs.tools),
+    ]
+    .into_iter()
+    .enumerate()
+    {
         let Some(tools) = tools else { continue };
         if operation == Operation::Fuse {
             bosses = tools.volume(VOLUME_EPS).map_err(text)?;
         }
         at.common = 0.0;
         if one_by_one {
-            tools.solids().map_err(text)?.iter().try_for_each(|tool| at.apply(operation, tool))?;
+            tools
+                .solids()
+                .map_err(text)?
+                .iter()
+                .try_for_each(|tool| at.apply(operation, tool))?;
         } else {
             at.apply(operation, tools)?;
         }
@@ -365,30 +539,54 @@ fn unite(body: &Body, inputs: &Inputs, fuzzy: f64, one_by_one: bool, context: &i
     volumes(&shape, commons, context)?;
     let mesh_shape = shape.translated([0.0; 3]).map_err(text)?;
     regions(&mesh_shape, context)?;
-    Ok(United { shape, mesh_shape, kinds: at.kinds })
+    Ok(United {
+        shape,
+        mesh_shape,
+        kinds: at.kinds,
+    })
 }
 
 /// What the kernel can check by itself.
-fn gates(shape: &Shape, organic_solids: u32, expected: f64, context: &inspect::Context) -> Result<(), String> {
+fn gates(
+    shape: &Shape,
+    organic_solids: u32,
+    expected: f64,
+    context: &inspect::Context,
+) -> Result<(), String> {
     let text = |e: OcctError| e.0;
     if let Some(fault) = shape.faults().map_err(text)? {
         return Err(format!("the union is not valid: {fault}"));
     }
     let counts = shape.counts().map_err(text)?;
     if counts.bad_edges > 0 {
-        return Err(format!("{} edges of the union have not exactly two faces", counts.bad_edges));
+        return Err(format!(
+            "{} edges of the union have not exactly two faces",
+            counts.bad_edges
+        ));
     }
-    let loose = context.probes.iter().filter(|p| p.overlap <= 1e-6 * p.region).count() as u32;
+    let loose = context
+        .probes
+        .iter()
+        .filter(|p| p.overlap <= 1e-6 * p.region)
+        .count() as u32;
     if counts.solids == 0 || counts.solids > organic_solids + loose {
-        return Err(format!("the union has {} solids; at most {} wanted", counts.solids, organic_solids + loose));
+        return Err(format!(
+            "the union has {} solids; at most {} wanted",
+            counts.solids,
+            organic_solids + loose
+        ));
     }
     let tolerance = shape.max_tolerance().map_err(text)?;
     if tolerance > MAX_TOLERANCE {
-        return Err(format!("the union's tolerance is {tolerance:.1e} mm; at most {MAX_TOLERANCE:.0e} wanted"));
+        return Err(format!(
+            "the union's tolerance is {tolerance:.1e} mm; at most {MAX_TOLERANCE:.0e} wanted"
+        ));
     }
     let volume = shape.volume(VOLUME_EPS).map_err(text)?;
     if ((volume - expected) / expected).abs() > IDENTITY {
-        return Err(format!("inclusion-exclusion gives {expected:.6} mm3, the union has {volume:.6} mm3"));
+        return Err(format!(
+            "inclusion-exclusion gives {expected:.6} mm3, the union has {volume:.6} mm3"
+        ));
     }
     Ok(())
 }
@@ -400,13 +598,20 @@ fn volumes(shape: &Shape, commons: [f64; 2], context: &inspect::Context) -> Resu
     let volume = shape.volume(VOLUME_EPS).map_err(|e| e.0)?;
     let rows = [
         ("the union", volume, context.reference),
-        ("the common part of fitted body and bosses", commons[0], sum(|p| p.overlap)),
+        (
+            "the common part of fitted body and bosses",
+            commons[0],
+            sum(|p| p.overlap),
+        ),
         ("what the bores removed", commons[1], sum(|p| p.removed)),
     ];
-    match rows.iter().find(|(_, got, wanted)| (got - wanted).abs() > allowed) {
-        Some((what, got, wanted)) => {
-            Err(format!("{what} has {got:.3} mm3, independent rays give {wanted:.3} mm3; {allowed:.3} mm3 of difference allowed"))
-        }
+    match rows
+        .iter()
+        .find(|(_, got, wanted)| (got - wanted).abs() > allowed)
+    {
+        Some((what, got, wanted)) => Err(format!(
+            "{what} has {got:.3} mm3, independent rays give {wanted:.3} mm3; {allowed:.3} mm3 of difference allowed"
+        )),
         None => Ok(()),
     }
 }
@@ -417,7 +622,10 @@ fn regions(shape: &Shape, context: &inspect::Context) -> Result<(), String> {
     for (probe, body) in context.probes.iter().zip(context.bodies) {
         let (missing, extra) = probe.compare(&mesh);
         if missing + extra > REGION_TOLERANCE * probe.region {
-            return Err(format!("around {} {missing:.3} mm3 are missing and {extra:.3} mm3 too much of {:.3} mm3", body.name, probe.region));
+            return Err(format!(
+                "around {} {missing:.3} mm3 are missing and {extra:.3} mm3 too much of {:.3} mm3",
+                body.name, probe.region
+            ));
         }
     }
     Ok(())

@@ -55,7 +55,9 @@ pub enum CadError {
         text: String,
     },
     /// A shell of the body lies where it cannot: a cavity outside all solids or a solid inside another.
-    #[error("shell {shell} of the body (volume {volume:.3} mm3) lies {depth} deep in the other shells; {wanted} wanted")]
+    #[error(
+        "shell {shell} of the body (volume {volume:.3} mm3) lies {depth} deep in the other shells; {wanted} wanted"
+    )]
     MisplacedShell {
         /// Index of the shell.
         shell: usize,
@@ -87,10 +89,16 @@ impl CadError {
     /// What the user can do about it.
     pub fn hint(&self) -> Option<String> {
         match self {
-            Self::Unreadable { .. } => Some("export the body again as STEP AP214 or AP242, or give it as a closed STL".into()),
+            Self::Unreadable { .. } => Some(
+                "export the body again as STEP AP214 or AP242, or give it as a closed STL".into(),
+            ),
             Self::NoSolid { .. } => Some("export solids, not surfaces or sketches".into()),
-            Self::InvalidSolid { .. } => Some("repair the body in the CAD system it comes from, then export it again".into()),
-            Self::OpenMesh { .. } | Self::BadMesh { .. } => Some("close the mesh, or give the non-design body as STEP".into()),
+            Self::InvalidSolid { .. } => {
+                Some("repair the body in the CAD system it comes from, then export it again".into())
+            }
+            Self::OpenMesh { .. } | Self::BadMesh { .. } => {
+                Some("close the mesh, or give the non-design body as STEP".into())
+            }
             Self::Write { .. } => Some("check that the folder exists and has room".into()),
             _ => None,
         }

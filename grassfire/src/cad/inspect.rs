@@ -44,33 +44,56 @@ pub(crate) struct Context<'a> {
 const SAMPLES: usize = 8;
 
 /// Finds for each face that is not organic the body, or the bore, whose surface it lies on.
-pub(crate) fn sources(shape: &Shape, kinds: &[Kind], context: &Context) -> Result<Vec<FaceSource>, CadError> {
-    let boxes: Vec<[[f64; 3]; 2]> = context.bodies.iter().map(|b| b.solid.bounds()).collect::<Result<_, _>>()?;
+pub(crate) fn sources(
+    shape: &Shape,
+    kinds: &[Kind],
+    context: &Context,
+) -> Result<Vec<FaceSource>, CadError> {
+    let boxes: Vec<[[f64; 3]; 2]> = context
+        .bodies
+        .iter()
+        .map(|b| b.solid.bounds())
+        .collect::<Result<_, _>>()?;
     let mut out = Vec::with_capacity(kinds.len());
     for (face, kind) in kinds.iter().enumerate() {
         if *kind == Kind::Organic {
             out.push(FaceSource::Organic);
             continue;
         }
-        let points: Vec<Vec3> = shape.face_samples(&[face as u32], SAMPLES)?.into_iter().map(Vec3::from).collect();
+        let points: Vec<Vec3> = shape
+            .face_samples(&[face as u32], SAMPLES)?
+            .into_iter()
+            .map(Vec3::from)
+            .collect();
         out.push(source(&points, *kind, context.bodies, &boxes)?);
     }
     Ok(out)
 }
 
-fn source(points: &[Vec3], kind: Kind, bodies: &[NonDesignBody], boxes: &[[[f64; 3]; 2]]) -> Result<FaceSource, OcctError> {
+fn source(
+    points: &[Vec3],
+    kind: Kind,
+    bodies: &[NonDesignBody],
+    boxes: &[[[f64; 3]; 2]],
+) -> Result<FaceSource, OcctError> {
     let mut best = (f64::MAX, FaceSource::Body(0));
     for (b, body) in bodies.iter().enumerate() {
         if kind == Kind::Bore {
             for (k, bore) in body.bores.iter().enumerate() {
                 // Of two coaxial bores of one radius the nearer one.
-                let away = points.iter().map(|p| bore.distance(*p) + 1e-9 * overshoot(bore, *p)).fold(0.0, f64::max);
+                let away = points
+                    .iter()
+                    .map(|p| bore.distance(*p) + 1e-9 * overshoot(bore, *p))
+                    .fold(0.0, f64::max);
                 if away < best.0 {
                     best = (away, FaceSource::Bore(b as u32, k as u32));
                 }
             }
         } else {
-            let outside = points.iter().map(|p| box_distance(&boxes[b], *p)).fold(0.0, f64::max);
+            let outside = points
+                .iter()
+                .map(|p| box_distance(&boxes[b], *p))
+                .fold(0.0, f64::max);
             if outside < best.0.min(1.0) {
                 let flat: Vec<[f64; 3]> = points.iter().map(|p| array(*p)).collect();
                 let away = body.solid.distances(&flat)?.into_iter().fold(0.0, f64::max);
@@ -90,14 +113,22 @@ fn overshoot(bore: &Bore, p: Vec3) -> f64 {
 }
 
 fn box_distance(bounds: &[[f64; 3]; 2], p: Vec3) -> f64 {
-    (0..3).map(|d| (bounds[0][d] - p[d]).max(p[d] - bounds[1][d]).max(0.0)).fold(0.0, f64::max)
+    (0..3)
+        .map(|d| (bounds[0][d] - p[d]).max(p[d] - bounds[1][d]).max(0.0))
+        .fold(0.0, f64::max)
 }
 
 /// Sources when the bodies lie side by side in a compound: their faces follow each other.
-pub(crate) fn separate_sources(organic: &[FaceSource], bodies: &[NonDesignBody]) -> Result<Vec<FaceSource>, OcctError> {
+pub(crate) fn separate_sources(
+    organic: &[FaceSource],
+    bodies: &[NonDesignBody],
+) -> Result<Vec<FaceSource>, OcctError> {
     let mut out = organic.to_vec();
     for (b, body) in bodies.iter().enumerate() {
-        out.extend(std::iter::repeat_n(FaceSource::Body(b as u32), body.solid.counts()?.faces as usize));
+        out.extend(std::iter::repeat_n(
+            FaceSource::Body(b as u32),
+            body.solid.counts()?.faces as usize,
+        ));
     }
     Ok(out)
 }
@@ -107,17 +138,18 @@ pub(crate) fn report(
     shape: Shape,
     sources: Vec<FaceSource>,
     mut messages: Vec<String>,
+    mut valid: bool,
     context: &Context,
     monitor: &Monitor,
 ) -> Result<CadSolid, CadError> {
-    let mut valid = messages.iter().all(|m| m.starts_with("the union worked") || m.starts_with("uniting"));
     let counts = shape.counts()?;
     if let Some(text) = shape.faults()? {
         valid = false;
         messages.push(format!("BRepCheck: {text}"));
     }
     let volume = shape.volume(1e-8)?;
-    let euler = i64::from(counts.vertices) - i64::from(counts.edges) + 2 * i64::from(counts.faces) - i64::from(counts.wires);
+    let euler = i64::from(counts.vertices) - i64::from(counts.edges) + 2 * i64::from(counts.faces)
+        - i64::from(counts.wires);
     let (mut g1_max, mut shortest) = (0.0f64, f64::MAX);
     for edge in shape.edges()? {
         shortest = shortest.min(edge.length);
@@ -132,7 +164,11 @@ pub(crate) fn report(
     let mut non_design = Vec::with_capacity(context.bodies.len());
     let faces = shape.faces()?;
     for (b, body) in context.bodies.iter().enumerate() {
-        let result = if context.probes.is_empty() { separate(body) } else { united(&shape, &faces, &sources, b, context)? };
+        let result = if context.probes.is_empty() {
+            separate(body)
+        } else {
+            united(&shape, &faces, &sources, b, context)?
+        };
         if !result.kept {
             valid = false;
             messages.push(format!(
@@ -180,7 +216,13 @@ fn separate(body: &NonDesignBody) -> NonDesignResult {
     }
 }
 
-fn united(shape: &Shape, faces: &[grassfire_occt::Face], sources: &[FaceSource], b: usize, context: &Context) -> Result<NonDesignResult, CadError> {
+fn united(
+    shape: &Shape,
+    faces: &[grassfire_occt::Face],
+    sources: &[FaceSource],
+    b: usize,
+    context: &Context,
+) -> Result<NonDesignResult, CadError> {
     let body = &context.bodies[b];
     let (mut own, mut walls) = (Vec::new(), Vec::new());
     for (f, source) in sources.iter().enumerate() {
@@ -190,13 +232,18 @@ fn united(shape: &Shape, faces: &[grassfire_occt::Face], sources: &[FaceSource],
             _ => {}
         }
     }
-    let mut max_distance = body.solid.distances(&shape.face_samples(&own, SAMPLES)?)?.into_iter().fold(0.0, f64::max);
+    let mut max_distance = body
+        .solid
+        .distances(&shape.face_samples(&own, SAMPLES)?)?
+        .into_iter()
+        .fold(0.0, f64::max);
     for &(face, k) in &walls {
         for p in shape.face_samples(&[face], SAMPLES)? {
             max_distance = max_distance.max(body.bores[k].distance(p.into()));
         }
     }
-    let area = |list: &mut dyn Iterator<Item = u32>| list.map(|f| faces[f as usize].area).sum::<f64>();
+    let area =
+        |list: &mut dyn Iterator<Item = u32>| list.map(|f| faces[f as usize].area).sum::<f64>();
     let (have, wanted) = if body.bores.is_empty() {
         (area(&mut own.iter().copied()), body.solid.area(1e-6)?)
     } else {
@@ -222,14 +269,24 @@ fn wall_area(body: &NonDesignBody) -> Result<f64, OcctError> {
         matches!(f.surface, Surface::Cylinder { concave: true, radius }
             if body.bores.iter().any(|b| (b.radius - radius).abs() < 1e-6 && b.distance(f.middle.into()) < 1e-6))
     };
-    Ok(body.solid.faces()?.iter().filter(|f| on_bore(f)).map(|f| f.area).sum())
+    Ok(body
+        .solid
+        .faces()?
+        .iter()
+        .filter(|f| on_bore(f))
+        .map(|f| f.area)
+        .sum())
 }
 
 /// No line along a bore, on its axis or near its wall, meets the part.
 fn bores_open(shape: &Shape, bores: &[Bore]) -> Result<bool, OcctError> {
     for bore in bores {
         let range = bore.free_range();
-        if shape.line_hits(&bore.lines(range))?.iter().any(|hits| !hits.is_empty()) {
+        if shape
+            .line_hits(&bore.lines(range))?
+            .iter()
+            .any(|hits| !hits.is_empty())
+        {
             return Ok(false);
         }
         let middle = bore.origin + bore.direction * ((range[0] + range[1]) / 2.0);

@@ -31,6 +31,8 @@ mod rebuild;
 mod reference;
 #[cfg(feature = "occt")]
 mod shells;
+#[cfg(feature = "occt")]
+mod split;
 
 pub use error::CadError;
 pub use options::{CadOptions, NonDesignOptions, StepOptions};
@@ -38,7 +40,7 @@ pub use options::{CadOptions, NonDesignOptions, StepOptions};
 #[cfg(feature = "occt")]
 pub use {
     bores::Bore,
-    build::{CadSolid, FaceSource, QuadsBrep, build},
+    build::{CadSolid, FaceSource, build},
     inspect::NonDesignResult,
     non_design::{NonDesignBody, Rebuilt, from_mesh, read},
     output::{tessellate, write_step},

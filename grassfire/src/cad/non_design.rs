@@ -54,21 +54,44 @@ const VOLUME_EPS: f64 = 1e-9;
 ///
 /// # Errors
 /// [`CadError::Unreadable`], [`CadError::NoSolid`], [`CadError::InvalidSolid`].
-pub fn read(path: &Path, options: &NonDesignOptions, monitor: &Monitor) -> Result<Vec<NonDesignBody>, CadError> {
+pub fn read(
+    path: &Path,
+    options: &NonDesignOptions,
+    monitor: &Monitor,
+) -> Result<Vec<NonDesignBody>, CadError> {
     let source = path.display().to_string();
     monitor.step(STAGE, "reading non-design bodies", 0.0)?;
-    let shape = Shape::read_step(path).map_err(|e| CadError::Unreadable { path: source.clone(), text: e.0 })?;
+    let shape = Shape::read_step(path).map_err(|e| CadError::Unreadable {
+        path: source.clone(),
+        text: e.0,
+    })?;
     let solids = shape.solids()?;
     if solids.is_empty() {
-        return Err(CadError::NoSolid { path: source, faces: shape.counts()?.faces });
+        return Err(CadError::NoSolid {
+            path: source,
+            faces: shape.counts()?.faces,
+        });
     }
-    let stem = path.file_stem().map_or_else(|| "body".into(), |s| s.to_string_lossy().into_owned());
+    let stem = path
+        .file_stem()
+        .map_or_else(|| "body".into(), |s| s.to_string_lossy().into_owned());
     let many = solids.len() > 1;
     let mut out = Vec::with_capacity(solids.len());
     for (i, solid) in solids.into_iter().enumerate() {
         monitor.check()?;
-        let name = if many { format!("{stem} {}", i + 1) } else { stem.clone() };
-        out.push(body(name, &source, Rebuilt::Exact, solid, options, monitor)?);
+        let name = if many {
+            format!("{stem} {}", i + 1)
+        } else {
+            stem.clone()
+        };
+        out.push(body(
+            name,
+            &source,
+            Rebuilt::Exact,
+            solid,
+            options,
+            monitor,
+        )?);
     }
     Ok(out)
 }
@@ -95,8 +118,16 @@ pub fn from_mesh(
     let many = parts.len() > 1;
     let mut out = Vec::with_capacity(parts.len());
     for (i, part) in parts.iter().enumerate() {
-        monitor.step(STAGE, "rebuilding non-design bodies", i as f64 / parts.len() as f64)?;
-        let name = if many { format!("{name} {}", i + 1) } else { name.to_owned() };
+        monitor.step(
+            STAGE,
+            "rebuilding non-design bodies",
+            i as f64 / parts.len() as f64,
+        )?;
+        let name = if many {
+            format!("{name} {}", i + 1)
+        } else {
+            name.to_owned()
+        };
         let (solid, rebuilt) = rebuild::solid(&name, part, options, monitor)?;
         out.push(body(name, source, rebuilt, solid, options, monitor)?);
     }
@@ -111,7 +142,10 @@ fn body(
     options: &NonDesignOptions,
     monitor: &Monitor,
 ) -> Result<NonDesignBody, CadError> {
-    let fail = |text: String| CadError::InvalidSolid { name: name.clone(), text };
+    let fail = |text: String| CadError::InvalidSolid {
+        name: name.clone(),
+        text,
+    };
     if let Some(text) = solid.faults()? {
         return Err(fail(text));
     }
@@ -134,7 +168,15 @@ fn body(
     for bore in &mut found {
         bores::extend(bore, options.bore_extension, &[&solid])?;
     }
-    Ok(NonDesignBody { name, source: source.to_owned(), rebuilt, solid, boss, bores: found, volume })
+    Ok(NonDesignBody {
+        name,
+        source: source.to_owned(),
+        rebuilt,
+        solid,
+        boss,
+        bores: found,
+        volume,
+    })
 }
 
 /// The solid with its bores filled; the volumes must add up.
@@ -144,7 +186,10 @@ fn fill(solid: &Shape, bores: &[Bore], volume: f64) -> Result<Shape, String> {
     for bore in bores {
         let plug = bore.plug().map_err(text)?;
         total += plug.volume(VOLUME_EPS).map_err(text)?;
-        boss = boss.boolean(Operation::Fuse, &plug, 1e-6, false, &|| false).map_err(text)?.shape;
+        boss = boss
+            .boolean(Operation::Fuse, &plug, 1e-6, false, &|| false)
+            .map_err(text)?
+            .shape;
     }
     if bores.is_empty() {
         return Ok(boss);
@@ -154,8 +199,13 @@ fn fill(solid: &Shape, bores: &[Bore], volume: f64) -> Result<Shape, String> {
     let counts = boss.counts().map_err(text)?;
     match boss.faults().map_err(text)? {
         Some(fault) => Err(fault),
-        None if counts.solids != 1 || counts.bad_edges != 0 => Err(format!("{} solids, {} open edges", counts.solids, counts.bad_edges)),
-        None if (got - total).abs() > 1e-6 * total => Err(format!("volume {got:.6} instead of {total:.6} mm3")),
+        None if counts.solids != 1 || counts.bad_edges != 0 => Err(format!(
+            "{} solids, {} open edges",
+            counts.solids, counts.bad_edges
+        )),
+        None if (got - total).abs() > 1e-6 * total => {
+            Err(format!("volume {got:.6} instead of {total:.6} mm3"))
+        }
         None => Ok(boss),
     }
 }

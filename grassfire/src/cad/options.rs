@@ -28,7 +28,7 @@ impl Default for CadOptions {
         Self {
             fuzzy: 1e-5,
             fuzzy_retry: 1e-4,
-            shift: 0.01,
+            shift: 0.03,
             volume_tolerance: 2e-3,
             distance_tolerance: 1e-3,
             boolean_seconds: 300.0,
@@ -51,7 +51,11 @@ pub struct NonDesignOptions {
 
 impl Default for NonDesignOptions {
     fn default() -> Self {
-        Self { mesh_tolerance: 0.02, sharp_angle: 25.0, bore_extension: 1.0 }
+        Self {
+            mesh_tolerance: 0.02,
+            sharp_angle: 25.0,
+            bore_extension: 1.0,
+        }
     }
 }
 
@@ -71,6 +75,11 @@ pub struct StepOptions {
 
 impl Default for StepOptions {
     fn default() -> Self {
-        Self { product: "part".into(), author: String::new(), organization: String::new(), time_stamp: String::new() }
+        Self {
+            product: "part".into(),
+            author: String::new(),
+            organization: String::new(),
+            time_stamp: String::new(),
+        }
     }
 }

@@ -19,8 +19,14 @@ const FACET: f64 = 0.35;
 /// # Errors
 /// [`CadError::Write`].
 pub fn write_step(solid: &CadSolid, path: &Path, options: &StepOptions) -> Result<(), CadError> {
-    let fail = |text: String| CadError::Write { path: path.display().to_string(), text };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let fail = |text: String| CadError::Write {
+        path: path.display().to_string(),
+        text,
+    };
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".part-").suffix(".step");
     #[cfg(unix)]
@@ -29,19 +35,37 @@ pub fn write_step(solid: &CadSolid, path: &Path, options: &StepOptions) -> Resul
         // As any new file: less what the umask forbids.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let file = builder.tempfile_in(folder).map_err(|e| fail(e.to_string()))?.into_temp_path();
-    let names = solid.non_design.iter().map(|n| n.name.as_str()).collect::<Vec<_>>();
+    let file = builder
+        .tempfile_in(folder)
+        .map_err(|e| fail(e.to_string()))?
+        .into_temp_path();
+    let names = solid
+        .non_design
+        .iter()
+        .map(|n| n.name.as_str())
+        .collect::<Vec<_>>();
     let texts = StepTexts {
         product: options.product.clone(),
         author: options.author.clone(),
         organization: options.organization.clone(),
         system: format!("grassfire {}", env!("CARGO_PKG_VERSION")),
-        description: if solid.valid { "solid reconstructed by grassfire".into() } else { "NOT VALID: see the report of grassfire".into() },
+        description: if solid.valid {
+            "solid reconstructed by grassfire".into()
+        } else {
+            "NOT VALID: see the report of grassfire".into()
+        },
         time_stamp: options.time_stamp.clone(),
         solids: solid_names(solid, &options.product),
-        faces: solid.sources.iter().map(|s| face_name(*s, &names)).collect(),
+        faces: solid
+            .sources
+            .iter()
+            .map(|s| face_name(*s, &names))
+            .collect(),
     };
-    solid.shape.write_step(&file, &texts).map_err(|OcctError(text)| fail(text))?;
+    solid
+        .shape
+        .write_step(&file, &texts)
+        .map_err(|OcctError(text)| fail(text))?;
     file.persist(path).map_err(|e| fail(e.to_string()))
 }
 

@@ -51,14 +51,25 @@ pub struct Region {
 /// # Errors
 /// [`CadError::BadMesh`] (empty, bad index, coordinate not finite), [`CadError::OpenMesh`].
 pub fn parts(name: &str, mesh: &TriMesh) -> Result<Vec<TriMesh>, CadError> {
-    let bad = |text: String| CadError::BadMesh { name: name.to_owned(), text };
+    let bad = |text: String| CadError::BadMesh {
+        name: name.to_owned(),
+        text,
+    };
     if mesh.triangles.is_empty() {
         return Err(bad("the mesh has no triangles".into()));
     }
-    if let Some(i) = mesh.points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+    if let Some(i) = mesh
+        .points
+        .iter()
+        .position(|p| p.iter().any(|x| !x.is_finite()))
+    {
         return Err(bad(format!("point {i} has a coordinate that is no number")));
     }
-    if let Some(t) = mesh.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= mesh.points.len())) {
+    if let Some(t) = mesh
+        .triangles
+        .iter()
+        .position(|t| t.iter().any(|&v| v as usize >= mesh.points.len()))
+    {
         return Err(bad(format!("triangle {t} names a missing point")));
     }
     let welded = weld(mesh);
@@ -87,7 +98,9 @@ pub fn parts(name: &str, mesh: &TriMesh) -> Result<Vec<TriMesh>, CadError> {
 }
 
 fn weld(mesh: &TriMesh) -> TriMesh {
-    let Some((low, high)) = mesh.bounds() else { return TriMesh::default() };
+    let Some((low, high)) = mesh.bounds() else {
+        return TriMesh::default();
+    };
     let cell = ((high - low).norm() * WELD).max(f64::MIN_POSITIVE);
     let mut cells: HashMap<[i64; 3], u32> = HashMap::with_capacity(mesh.points.len());
     let mut out = TriMesh::default();
@@ -95,8 +108,15 @@ fn weld(mesh: &TriMesh) -> TriMesh {
     for p in &mesh.points {
         let key: [i64; 3] = std::array::from_fn(|k| ((p[k] - low[k]) / cell).floor() as i64);
         let near = (0..27).find_map(|n| {
-            let at = [key[0] + n % 3 - 1, key[1] + n / 3 % 3 - 1, key[2] + n / 9 - 1];
-            cells.get(&at).copied().filter(|&i: &u32| (out.points[i as usize] - p).norm() <= cell)
+            let at = [
+                key[0] + n % 3 - 1,
+                key[1] + n / 3 % 3 - 1,
+                key[2] + n / 9 - 1,
+            ];
+            cells
+                .get(&at)
+                .copied()
+                .filter(|&i: &u32| (out.points[i as usize] - p).norm() <= cell)
         });
         map.push(near.unwrap_or_else(|| {
             let i = out.points.len() as u32;
@@ -106,7 +126,9 @@ fn weld(mesh: &TriMesh) -> TriMesh {
         }));
     }
     let triangles = mesh.triangles.iter().map(|t| t.map(|v| map[v as usize]));
-    out.triangles = triangles.filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]).collect();
+    out.triangles = triangles
+        .filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0])
+        .collect();
     out
 }
 
@@ -173,18 +195,27 @@ fn check_closed(name: &str, part: &TriMesh) -> Result<(), CadError> {
         Ok(_) => Ok(()),
         Err((edges, [a, b])) => {
             let place = (part.points[a as usize] + part.points[b as usize]) / 2.0;
-            Err(CadError::OpenMesh { name: name.to_owned(), edges, place: place.into() })
+            Err(CadError::OpenMesh {
+                name: name.to_owned(),
+                edges,
+                place: place.into(),
+            })
         }
     }
 }
 
 /// Cuts a closed mesh at edges sharper than `sharp_angle` degrees and fits a plane or a cylinder to every piece.
 pub fn regions(mesh: &TriMesh, sharp_angle: f64, tolerance: f64) -> Vec<Region> {
-    let Ok(next) = neighbours(mesh) else { return Vec::new() };
+    let Ok(next) = neighbours(mesh) else {
+        return Vec::new();
+    };
     let normal: Vec<Vec3> = (0..mesh.triangles.len())
         .map(|t| {
             let [a, b, c] = mesh.corners(t);
-            (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(Vec3::zeros)
+            (b - a)
+                .cross(&(c - a))
+                .try_normalize(0.0)
+                .unwrap_or_else(Vec3::zeros)
         })
         .collect();
     let limit = sharp_angle.to_radians().cos();
@@ -200,7 +231,8 @@ pub fn regions(mesh: &TriMesh, sharp_angle: f64, tolerance: f64) -> Vec<Region> 
             at += 1;
             for &n in &next[t as usize] {
                 // A sliver without a normal joins whatever it touches.
-                let sharp = normal[t as usize].dot(&normal[n as usize]) < limit && normal[n as usize] != Vec3::zeros();
+                let sharp = normal[t as usize].dot(&normal[n as usize]) < limit
+                    && normal[n as usize] != Vec3::zeros();
                 if !seen[n as usize] && !sharp {
                     seen[n as usize] = true;
                     triangles.push(n);
@@ -214,7 +246,10 @@ pub fn regions(mesh: &TriMesh, sharp_angle: f64, tolerance: f64) -> Vec<Region> 
 }
 
 fn fit(mesh: &TriMesh, normal: &[Vec3], triangles: Vec<u32>, tolerance: f64) -> Region {
-    let mut vertices: Vec<u32> = triangles.iter().flat_map(|&t| mesh.triangles[t as usize]).collect();
+    let mut vertices: Vec<u32> = triangles
+        .iter()
+        .flat_map(|&t| mesh.triangles[t as usize])
+        .collect();
     vertices.sort_unstable();
     vertices.dedup();
     let points: Vec<Vec3> = vertices.iter().map(|&v| mesh.points[v as usize]).collect();
@@ -222,16 +257,32 @@ fn fit(mesh: &TriMesh, normal: &[Vec3], triangles: Vec<u32>, tolerance: f64) -> 
         .iter()
         .map(|&t| {
             let [a, b, c] = mesh.corners(t as usize);
-            ((a + b + c) / 3.0, normal[t as usize], (b - a).cross(&(c - a)).norm() / 2.0)
+            (
+                (a + b + c) / 3.0,
+                normal[t as usize],
+                (b - a).cross(&(c - a)).norm() / 2.0,
+            )
         })
         .collect();
     let (plane, flat) = fit_plane(&points, &weighted);
     if flat <= tolerance {
-        return Region { triangles, primitive: Some(plane), residual: flat };
+        return Region {
+            triangles,
+            primitive: Some(plane),
+            residual: flat,
+        };
     }
     match fit_cylinder(&points, &weighted) {
-        Some((cylinder, residual)) if residual <= tolerance => Region { triangles, primitive: Some(cylinder), residual },
-        other => Region { triangles, primitive: None, residual: other.map_or(flat, |o| o.1.min(flat)) },
+        Some((cylinder, residual)) if residual <= tolerance => Region {
+            triangles,
+            primitive: Some(cylinder),
+            residual,
+        },
+        other => Region {
+            triangles,
+            primitive: None,
+            residual: other.map_or(flat, |o| o.1.min(flat)),
+        },
     }
 }
 
@@ -247,8 +298,17 @@ fn fit_plane(points: &[Vec3], weighted: &[(Vec3, Vec3, f64)]) -> (Primitive, f64
     if normal.dot(&outward) < 0.0 {
         normal = -normal;
     }
-    let residual = points.iter().map(|p| (p - centre).dot(&normal).abs()).fold(0.0, f64::max);
-    (Primitive::Plane { normal, offset: normal.dot(&centre) }, residual)
+    let residual = points
+        .iter()
+        .map(|p| (p - centre).dot(&normal).abs())
+        .fold(0.0, f64::max);
+    (
+        Primitive::Plane {
+            normal,
+            offset: normal.dot(&centre),
+        },
+        residual,
+    )
 }
 
 /// Axis from the normals (they lie in a plane), circle by linear least squares, then Gauss-Newton on all five parameters.
@@ -262,13 +322,27 @@ fn fit_cylinder(points: &[Vec3], weighted: &[(Vec3, Vec3, f64)]) -> Option<(Prim
     let mut origin = points.iter().sum::<Vec3>() / points.len() as f64;
     let mut radius = 0.0;
     for round in 0..20 {
-        let side = if direction.x.abs() < 0.8 { Vec3::x() } else { Vec3::y() };
+        let side = if direction.x.abs() < 0.8 {
+            Vec3::x()
+        } else {
+            Vec3::y()
+        };
         let e1 = direction.cross(&side).normalize();
         let e2 = direction.cross(&e1);
-        let local = |p: &Vec3| [(p - origin).dot(&e1), (p - origin).dot(&e2), (p - origin).dot(&direction)];
+        let local = |p: &Vec3| {
+            [
+                (p - origin).dot(&e1),
+                (p - origin).dot(&e2),
+                (p - origin).dot(&direction),
+            ]
+        };
         if round == 0 {
             let rows = points.iter().map(local).collect::<Vec<_>>();
-            let a = DMatrix::from_fn(rows.len(), 3, |i, k| if k < 2 { 2.0 * rows[i][k] } else { 1.0 });
+            let a = DMatrix::from_fn(
+                rows.len(),
+                3,
+                |i, k| if k < 2 { 2.0 * rows[i][k] } else { 1.0 },
+            );
             let b = DVector::from_fn(rows.len(), |i, _| rows[i][0].powi(2) + rows[i][1].powi(2));
             let s = (a.transpose() * &a).lu().solve(&(a.transpose() * b))?;
             radius = (s[2] + s[0] * s[0] + s[1] * s[1]).max(0.0).sqrt();
@@ -301,9 +375,23 @@ fn fit_cylinder(points: &[Vec3], weighted: &[(Vec3, Vec3, f64)]) -> Option<(Prim
         let q = p - origin;
         q - direction * q.dot(&direction)
     };
-    let residual = points.iter().map(|&p| (radial(p).norm() - radius).abs()).fold(0.0, f64::max);
-    let outward: f64 = weighted.iter().map(|(centre, n, area)| radial(*centre).dot(n) * area).sum();
+    let residual = points
+        .iter()
+        .map(|&p| (radial(p).norm() - radius).abs())
+        .fold(0.0, f64::max);
+    let outward: f64 = weighted
+        .iter()
+        .map(|(centre, n, area)| radial(*centre).dot(n) * area)
+        .sum();
     let flip = direction[direction.iamax()] < 0.0;
     let direction = if flip { -direction } else { direction };
-    Some((Primitive::Cylinder { origin, direction, radius, concave: outward < 0.0 }, residual))
+    Some((
+        Primitive::Cylinder {
+            origin,
+            direction,
+            radius,
+            concave: outward < 0.0,
+        },
+        residual,
+    ))
 }

@@ -17,7 +17,11 @@ impl RayGrid {
     ///
     /// The direction is a fixed one oblique to `axis`, so that neither walls nor ends of a cylinder are parallel to the rays.
     pub(crate) fn around(points: &[Vec3], axis: Vec3, across: u32) -> Self {
-        let side = if axis.x.abs() < 0.8 { Vec3::x() } else { Vec3::y() };
+        let side = if axis.x.abs() < 0.8 {
+            Vec3::x()
+        } else {
+            Vec3::y()
+        };
         let first = axis.cross(&side).normalize();
         let second = axis.cross(&first);
         let along = (axis + first * 0.61 + second * 0.37).normalize();
@@ -35,7 +39,12 @@ impl RayGrid {
         let count = [0, 1].map(|k| ((high[k] - low[k]) / step).ceil().max(1.0) as usize);
         // Irrational offset: no ray meets a vertex of a regular shape.
         let low = [low[0] + step * 0.381_966, low[1] + step * 0.618_034];
-        Self { axes, low, step, count }
+        Self {
+            axes,
+            low,
+            step,
+            count,
+        }
     }
 
     /// Area that one ray stands for, mm2.
@@ -53,18 +62,26 @@ impl RayGrid {
         (0..2).all(|k| {
             let at = middle.dot(&self.axes[k]);
             let reach = half.dot(&self.axes[k].abs());
-            at + reach >= self.low[k] && at - reach <= self.low[k] + self.step * self.count[k] as f64
+            at + reach >= self.low[k]
+                && at - reach <= self.low[k] + self.step * self.count[k] as f64
         })
     }
 
     /// The part of each ray inside the closed surface made of `triangles`.
-    pub(crate) fn columns<'a>(&self, triangles: impl IntoIterator<Item = &'a [Vec3; 3]>) -> Columns {
+    pub(crate) fn columns<'a>(
+        &self,
+        triangles: impl IntoIterator<Item = &'a [Vec3; 3]>,
+    ) -> Columns {
         let mut hits: Vec<(u32, i32, f64)> = Vec::new();
         for t in triangles {
             self.scan(t, &mut hits);
         }
         hits.sort_by(|a, b| a.0.cmp(&b.0).then(a.2.total_cmp(&b.2)));
-        let mut out = Columns { start: Vec::with_capacity(self.rays() + 1), spans: Vec::new(), broken: Vec::new() };
+        let mut out = Columns {
+            start: Vec::with_capacity(self.rays() + 1),
+            spans: Vec::new(),
+            broken: Vec::new(),
+        };
         let mut at = 0;
         for ray in 0..self.rays() as u32 {
             out.start.push(out.spans.len());
@@ -102,12 +119,20 @@ impl RayGrid {
         }
         for i in range(0) {
             for j in range(1) {
-                let ray = Coord { x: self.low[0] + self.step * i as f64, y: self.low[1] + self.step * j as f64 };
+                let ray = Coord {
+                    x: self.low[0] + self.step * i as f64,
+                    y: self.low[1] + self.step * j as f64,
+                };
                 let side = [0, 1, 2].map(|k| orient2d(flat[(k + 1) % 3], flat[(k + 2) % 3], ray));
                 if (0..3).all(|k| inside(side[k], area, flat[(k + 1) % 3], flat[(k + 2) % 3])) {
-                    let z = (side[0] * p[0][2] + side[1] * p[1][2] + side[2] * p[2][2]) / (side[0] + side[1] + side[2]);
+                    let z = (side[0] * p[0][2] + side[1] * p[1][2] + side[2] * p[2][2])
+                        / (side[0] + side[1] + side[2]);
                     // A surface seen from its outer side by the ray's far end is left there.
-                    hits.push(((i * self.count[1] + j) as u32, if area > 0.0 { -1 } else { 1 }, z));
+                    hits.push((
+                        (i * self.count[1] + j) as u32,
+                        if area > 0.0 { -1 } else { 1 },
+                        z,
+                    ));
                 }
             }
         }
@@ -132,7 +157,11 @@ pub(crate) struct Columns {
 impl Columns {
     /// Nothing inside.
     pub(crate) fn empty(grid: &RayGrid) -> Self {
-        Self { start: vec![0; grid.rays() + 1], spans: Vec::new(), broken: Vec::new() }
+        Self {
+            start: vec![0; grid.rays() + 1],
+            spans: Vec::new(),
+            broken: Vec::new(),
+        }
     }
 
     fn ray(&self, ray: usize) -> &[[f64; 2]] {
@@ -173,8 +202,19 @@ mod tests {
 
     fn cube(low: f64, high: f64) -> Vec<[Vec3; 3]> {
         let p = |k: usize| Vec3::from_fn(|d, _| if k >> d & 1 == 1 { high } else { low });
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).map(|t| t.map(p)).collect()
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        quads
+            .iter()
+            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
+            .map(|t| t.map(p))
+            .collect()
     }
 
     #[test]
@@ -184,10 +224,15 @@ mod tests {
         let grid = RayGrid::around(&points, Vec3::z(), 300);
         let columns = [grid.columns(&a), grid.columns(&b)];
         let mut volumes = [0.0; 4];
-        sweep(&grid, &[&columns[0], &columns[1]], |mask, v| volumes[mask as usize] += v);
+        sweep(&grid, &[&columns[0], &columns[1]], |mask, v| {
+            volumes[mask as usize] += v
+        });
         assert!(columns.iter().all(|c| c.broken.is_empty()));
         for (got, wanted) in volumes[1..].iter().zip([7.0, 7.0, 1.0]) {
-            assert!((got - wanted).abs() < 2e-3 * wanted, "{got} instead of {wanted}");
+            assert!(
+                (got - wanted).abs() < 2e-3 * wanted,
+                "{got} instead of {wanted}"
+            );
         }
     }
 }

@@ -20,9 +20,16 @@ const MAX_FACETS: usize = 20_000;
 ///
 /// # Errors
 /// [`CadError::BadMesh`] when even the facets make no valid solid.
-pub(crate) fn solid(name: &str, part: &TriMesh, options: &NonDesignOptions, monitor: &Monitor) -> Result<(Shape, Rebuilt), CadError> {
+pub(crate) fn solid(
+    name: &str,
+    part: &TriMesh,
+    options: &NonDesignOptions,
+    monitor: &Monitor,
+) -> Result<(Shape, Rebuilt), CadError> {
     let regions = primitives::regions(part, options.sharp_angle, options.mesh_tolerance);
-    if let Some((shape, residual)) = revolution(part, &regions, options.mesh_tolerance).filter(|(s, _)| agrees(s, part)) {
+    if let Some((shape, residual)) =
+        revolution(part, &regions, options.mesh_tolerance).filter(|(s, _)| agrees(s, part))
+    {
         return Ok((shape, Rebuilt::Revolution { residual }));
     }
     if let Some((shape, residual)) = prismatic(part, &regions).filter(|(s, _)| agrees(s, part)) {
@@ -42,13 +49,22 @@ pub(crate) fn solid(name: &str, part: &TriMesh, options: &NonDesignOptions, moni
 }
 
 fn agrees(shape: &Shape, part: &TriMesh) -> bool {
-    let sound = matches!(shape.faults(), Ok(None)) && shape.counts().is_ok_and(|c| c.solids == 1 && c.bad_edges == 0);
+    let sound = matches!(shape.faults(), Ok(None))
+        && shape
+            .counts()
+            .is_ok_and(|c| c.solids == 1 && c.bad_edges == 0);
     let exact = part.volume();
-    sound && shape.volume(1e-9).is_ok_and(|v| (v - exact).abs() < VOLUME_MARGIN * exact)
+    sound
+        && shape
+            .volume(1e-9)
+            .is_ok_and(|v| (v - exact).abs() < VOLUME_MARGIN * exact)
 }
 
 fn faceted(name: &str, part: &TriMesh) -> Result<Shape, CadError> {
-    let bad = |text: String| CadError::BadMesh { name: name.to_owned(), text };
+    let bad = |text: String| CadError::BadMesh {
+        name: name.to_owned(),
+        text,
+    };
     if part.triangles.len() > MAX_FACETS {
         return Err(bad(format!(
             "{} triangles on surfaces that are neither planes nor cylinders; at most {MAX_FACETS} can be used as they are",
@@ -60,7 +76,11 @@ fn faceted(name: &str, part: &TriMesh) -> Result<Shape, CadError> {
     if let Some(better) = raw.unified().ok().filter(|s| agrees(s, part)) {
         return Ok(better);
     }
-    if agrees(&raw, part) { Ok(raw) } else { Err(bad("its triangles make no valid solid".into())) }
+    if agrees(&raw, part) {
+        Ok(raw)
+    } else {
+        Err(bad("its triangles make no valid solid".into()))
+    }
 }
 
 // ---------------------------------------------------------------------------------------------- turned bodies
@@ -77,7 +97,12 @@ fn revolution(part: &TriMesh, regions: &[Region], tolerance: f64) -> Option<(Sha
         .iter()
         .filter(|r| matches!(r.primitive, Some(Primitive::Cylinder { .. })))
         .max_by_key(|r| (r.triangles.len(), std::cmp::Reverse(r.triangles[0])))?;
-    let Some(Primitive::Cylinder { origin, direction, .. }) = largest.primitive else { return None };
+    let Some(Primitive::Cylinder {
+        origin, direction, ..
+    }) = largest.primitive
+    else {
+        return None;
+    };
     let mut lines = Vec::with_capacity(regions.len());
     let mut worst = 0.0f64;
     for region in regions {
@@ -99,14 +124,24 @@ fn revolution(part: &TriMesh, regions: &[Region], tolerance: f64) -> Option<(Sha
         profile.push(meet(&lines[pair[0]], &lines[pair[1]])?);
     }
     let (first, last) = (ids[0], *ids.last()?);
-    profile.push(if closed { meet(&lines[last], &lines[first])? } else { meet(&lines[last], &axis_line())? });
-    let profile: Vec<[f64; 2]> = profile.iter().map(|p| [if p.x.abs() < 1e-9 { 0.0 } else { p.x }, p.y]).collect();
+    profile.push(if closed {
+        meet(&lines[last], &lines[first])?
+    } else {
+        meet(&lines[last], &axis_line())?
+    });
+    let profile: Vec<[f64; 2]> = profile
+        .iter()
+        .map(|p| [if p.x.abs() < 1e-9 { 0.0 } else { p.x }, p.y])
+        .collect();
     let shape = Shape::revolve(array(origin), array(direction), &profile).ok()?;
     Some((shape, worst))
 }
 
 fn axis_line() -> ProfileLine {
-    ProfileLine { normal: Vector2::new(1.0, 0.0), offset: 0.0 }
+    ProfileLine {
+        normal: Vector2::new(1.0, 0.0),
+        offset: 0.0,
+    }
 }
 
 fn meet(a: &ProfileLine, b: &ProfileLine) -> Option<Vector2<f64>> {
@@ -117,8 +152,17 @@ fn meet(a: &ProfileLine, b: &ProfileLine) -> Option<Vector2<f64>> {
     m.lu().solve(&Vector2::new(a.offset, b.offset))
 }
 
-fn profile_line(part: &TriMesh, region: &Region, origin: Vec3, direction: Vec3) -> (ProfileLine, f64) {
-    let mut vertices: Vec<u32> = region.triangles.iter().flat_map(|&t| part.triangles[t as usize]).collect();
+fn profile_line(
+    part: &TriMesh,
+    region: &Region,
+    origin: Vec3,
+    direction: Vec3,
+) -> (ProfileLine, f64) {
+    let mut vertices: Vec<u32> = region
+        .triangles
+        .iter()
+        .flat_map(|&t| part.triangles[t as usize])
+        .collect();
     vertices.sort_unstable();
     vertices.dedup();
     let points: Vec<Vector2<f64>> = vertices
@@ -137,8 +181,14 @@ fn profile_line(part: &TriMesh, region: &Region, origin: Vec3, direction: Vec3) 
     let eigen = spread.symmetric_eigen();
     let mut normal: Vector2<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();
     // A flat end without inner vertices has one radius only: its line is across the axis all the same.
-    if let Some(Primitive::Plane { normal: n, .. }) = region.primitive.filter(|_| eigen.eigenvalues.max() < 1e-9) {
-        normal = if n.dot(&direction).abs() > 0.5 { Vector2::new(0.0, 1.0) } else { normal };
+    if let Some(Primitive::Plane { normal: n, .. }) =
+        region.primitive.filter(|_| eigen.eigenvalues.max() < 1e-9)
+    {
+        normal = if n.dot(&direction).abs() > 0.5 {
+            Vector2::new(0.0, 1.0)
+        } else {
+            normal
+        };
     }
     // Mesh noise must not turn walls and ends into cones.
     let snap = 1e-4;
@@ -147,8 +197,17 @@ fn profile_line(part: &TriMesh, region: &Region, origin: Vec3, direction: Vec3) 
     } else if normal.y.abs() < snap {
         normal = Vector2::new(1.0, 0.0);
     }
-    let residual = points.iter().map(|p| (p - centre).dot(&normal).abs()).fold(0.0, f64::max);
-    (ProfileLine { normal, offset: normal.dot(&centre) }, residual)
+    let residual = points
+        .iter()
+        .map(|p| (p - centre).dot(&normal).abs())
+        .fold(0.0, f64::max);
+    (
+        ProfileLine {
+            normal,
+            offset: normal.dot(&centre),
+        },
+        residual,
+    )
 }
 
 struct ProfileOrder {
@@ -159,7 +218,10 @@ struct ProfileOrder {
 fn region_of(part: &TriMesh, regions: &[Region]) -> Vec<u32> {
     let mut of = vec![0u32; part.triangles.len()];
     for (r, region) in regions.iter().enumerate() {
-        region.triangles.iter().for_each(|&t| of[t as usize] = r as u32);
+        region
+            .triangles
+            .iter()
+            .for_each(|&t| of[t as usize] = r as u32);
     }
     of
 }
@@ -192,7 +254,10 @@ fn profile_order(part: &TriMesh, regions: &[Region]) -> Option<ProfileOrder> {
         used[next] = true;
         order.push(next);
     }
-    (order.len() == regions.len()).then_some(ProfileOrder { regions: order, closed })
+    (order.len() == regions.len()).then_some(ProfileOrder {
+        regions: order,
+        closed,
+    })
 }
 
 // ---------------------------------------------------------------------------------------------- planes and bores
@@ -204,18 +269,30 @@ fn profile_order(part: &TriMesh, regions: &[Region]) -> Option<ProfileOrder> {
 /// 3. Make the polyhedron, merge coplanar facets, cut the bores.
 fn prismatic(part: &TriMesh, regions: &[Region]) -> Option<(Shape, f64)> {
     let of = region_of(part, regions);
-    if regions.iter().any(|r| !matches!(r.primitive, Some(Primitive::Plane { .. } | Primitive::Cylinder { concave: true, .. }))) {
+    if regions.iter().any(|r| {
+        !matches!(
+            r.primitive,
+            Some(Primitive::Plane { .. } | Primitive::Cylinder { concave: true, .. })
+        )
+    }) {
         return None;
     }
     let mut points = snapped(part, regions, &of)?;
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     for (t, triangle) in part.triangles.iter().enumerate() {
-        if matches!(regions[of[t] as usize].primitive, Some(Primitive::Plane { .. })) {
+        if matches!(
+            regions[of[t] as usize].primitive,
+            Some(Primitive::Plane { .. })
+        ) {
             triangles.push(*triangle);
         }
     }
     cap(&mut points, &mut triangles)?;
-    let closed = TriMesh { points, triangles, tags: Vec::new() };
+    let closed = TriMesh {
+        points,
+        triangles,
+        tags: Vec::new(),
+    };
     let mut body: Option<Shape> = None;
     for piece in primitives::parts("polyhedron", &closed).ok()? {
         // A closed bottom and its cap make a flat body of no volume.
@@ -230,9 +307,18 @@ fn prismatic(part: &TriMesh, regions: &[Region]) -> Option<(Shape, f64)> {
     }
     let mut body = body?;
     for region in regions {
-        if let Some(Primitive::Cylinder { origin, direction, radius, .. }) = region.primitive {
+        if let Some(Primitive::Cylinder {
+            origin,
+            direction,
+            radius,
+            ..
+        }) = region.primitive
+        {
             let tool = bore_tool(part, regions, &of, region, (origin, direction, radius))?;
-            body = body.boolean(Operation::Cut, &tool, 1e-5, false, &|| false).ok()?.shape;
+            body = body
+                .boolean(Operation::Cut, &tool, 1e-5, false, &|| false)
+                .ok()?
+                .shape;
         }
     }
     Some((body, regions.iter().map(|r| r.residual).fold(0.0, f64::max)))
@@ -292,14 +378,27 @@ fn cap(points: &mut Vec<Vec3>, triangles: &mut Vec<[u32; 3]>) -> Option<()> {
 }
 
 /// The cylinder between the two planes at its ends; a little longer where it is open.
-fn bore_tool(part: &TriMesh, regions: &[Region], of: &[u32], bore: &Region, (origin, direction, radius): (Vec3, Vec3, f64)) -> Option<Shape> {
+fn bore_tool(
+    part: &TriMesh,
+    regions: &[Region],
+    of: &[u32],
+    bore: &Region,
+    (origin, direction, radius): (Vec3, Vec3, f64),
+) -> Option<Shape> {
     let own = of[bore.triangles[0] as usize];
     let inside: BTreeSet<u32> = bore.triangles.iter().copied().collect();
     let all = neighbours(part).ok()?;
-    let around: BTreeSet<u32> = inside.iter().flat_map(|&t| all[t as usize]).map(|t| of[t as usize]).filter(|&r| r != own).collect();
+    let around: BTreeSet<u32> = inside
+        .iter()
+        .flat_map(|&t| all[t as usize])
+        .map(|t| of[t as usize])
+        .filter(|&r| r != own)
+        .collect();
     let mut heights = Vec::new();
     for r in around {
-        let Some(Primitive::Plane { normal, offset }) = regions[r as usize].primitive else { return None };
+        let Some(Primitive::Plane { normal, offset }) = regions[r as usize].primitive else {
+            return None;
+        };
         let slope = normal.dot(&direction);
         if slope.abs() < 1.0 - 1e-6 {
             return None;
@@ -307,9 +406,17 @@ fn bore_tool(part: &TriMesh, regions: &[Region], of: &[u32], bore: &Region, (ori
         heights.push(((offset - normal.dot(&origin)) / slope, slope));
     }
     heights.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let &[(low, low_slope), (high, high_slope)] = heights.as_slice() else { return None };
+    let &[(low, low_slope), (high, high_slope)] = heights.as_slice() else {
+        return None;
+    };
     let more = 0.05 * radius;
     let from = if low_slope < 0.0 { low - more } else { low };
     let to = if high_slope > 0.0 { high + more } else { high };
-    Shape::cylinder(array(origin + direction * from), array(direction), radius, to - from).ok()
+    Shape::cylinder(
+        array(origin + direction * from),
+        array(direction),
+        radius,
+        to - from,
+    )
+    .ok()
 }

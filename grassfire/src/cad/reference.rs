@@ -39,14 +39,25 @@ fn facets(shape: &Shape, chord: f64, angle: f64) -> Result<Vec<[Vec3; 3]>, OcctE
 }
 
 /// Triangles of a shape, which keeps the triangulation.
-pub(crate) fn triangles(shape: &Shape, chord: f64, angle: f64) -> Result<Vec<[Vec3; 3]>, OcctError> {
+pub(crate) fn triangles(
+    shape: &Shape,
+    chord: f64,
+    angle: f64,
+) -> Result<Vec<[Vec3; 3]>, OcctError> {
     let mesh = shape.tessellate(chord, angle)?;
-    Ok(mesh.triangles.iter().map(|t| t.map(|v| mesh.points[v as usize].into())).collect())
+    Ok(mesh
+        .triangles
+        .iter()
+        .map(|t| t.map(|v| mesh.points[v as usize].into()))
+        .collect())
 }
 
 fn bounds(triangles: &[[Vec3; 3]]) -> (Vec3, Vec3) {
     let start = (Vec3::repeat(f64::MAX), Vec3::repeat(f64::MIN));
-    triangles.iter().flatten().fold(start, |(lo, hi), p| (lo.inf(p), hi.sup(p)))
+    triangles
+        .iter()
+        .flatten()
+        .fold(start, |(lo, hi), p| (lo.inf(p), hi.sup(p)))
 }
 
 /// Integrates about every body.
@@ -64,7 +75,9 @@ pub(crate) fn probes(
         let size = body.boss.bounds()?;
         let chord = (Vec3::from(size[1]) - Vec3::from(size[0])).norm() * 2e-4;
         let boss = facets(&body.boss, chord, FACET)?;
-        let tool = tool.as_ref().map_or(Ok(Vec::new()), |t| facets(t, chord, FACET))?;
+        let tool = tool
+            .as_ref()
+            .map_or(Ok(Vec::new()), |t| facets(t, chord, FACET))?;
         meshes.push((boss, tool));
     }
     let mut out = Vec::with_capacity(bodies.len());
@@ -89,8 +102,17 @@ pub(crate) fn probes(
                 solids.push((j, grid.columns(boss), grid.columns(tool)));
             }
         }
-        let mut probe =
-            Probe { grid, organic, solids, body: i, region: 0.0, organic_volume: 0.0, overlap: 0.0, removed: 0.0, part_volume: 0.0 };
+        let mut probe = Probe {
+            grid,
+            organic,
+            solids,
+            body: i,
+            region: 0.0,
+            organic_volume: 0.0,
+            overlap: 0.0,
+            removed: 0.0,
+            part_volume: 0.0,
+        };
         probe.integrate();
         out.push(probe);
     }
@@ -117,7 +139,12 @@ impl Masks {
 
 impl Probe {
     fn masks(&self) -> Masks {
-        let mut out = Masks { bosses: 0, tools: 0, own: 0, earlier: 0 };
+        let mut out = Masks {
+            bosses: 0,
+            tools: 0,
+            own: 0,
+            earlier: 0,
+        };
         for (k, (body, _, _)) in self.solids.iter().enumerate() {
             let (boss, tool) = (1u128 << (2 + 2 * k), 1u128 << (3 + 2 * k));
             out.bosses |= boss;
@@ -145,10 +172,25 @@ impl Probe {
                 return;
             }
             let solid = mask & (1 | masks.bosses) != 0;
-            let hits = [true, mask & 1 != 0, mask & 1 != 0 && mask & masks.bosses != 0, solid && mask & masks.tools != 0, masks.is_part(mask)];
-            hits.iter().zip(&mut sums).filter(|(hit, _)| **hit).for_each(|(_, sum)| *sum += volume);
+            let hits = [
+                true,
+                mask & 1 != 0,
+                mask & 1 != 0 && mask & masks.bosses != 0,
+                solid && mask & masks.tools != 0,
+                masks.is_part(mask),
+            ];
+            hits.iter()
+                .zip(&mut sums)
+                .filter(|(hit, _)| **hit)
+                .for_each(|(_, sum)| *sum += volume);
         });
-        [self.region, self.organic_volume, self.overlap, self.removed, self.part_volume] = sums;
+        [
+            self.region,
+            self.organic_volume,
+            self.overlap,
+            self.removed,
+            self.part_volume,
+        ] = sums;
     }
 
     /// Compares a part with what it must be, ray by ray: (volume missing, volume too much), mm3.

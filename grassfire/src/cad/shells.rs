@@ -16,17 +16,34 @@ const CELLS: usize = 4;
 /// # Errors
 /// [`CadError::MisplacedShell`] when a winding number is wrong.
 pub(crate) fn classify(brep: &Brep) -> Result<Vec<Vec<usize>>, CadError> {
-    let meshes: Vec<Vec<[Vec3; 3]>> = brep.shells.iter().map(|faces| triangulate(brep, faces)).collect();
+    let meshes: Vec<Vec<[Vec3; 3]>> = brep
+        .shells
+        .iter()
+        .map(|faces| triangulate(brep, faces))
+        .collect();
     let volumes: Vec<f64> = meshes.iter().map(|m| volume(m)).collect();
     if meshes.len() == 1 && volumes[0] > 0.0 {
         return Ok(vec![vec![0]]);
     }
-    let mut solids: Vec<Vec<usize>> = (0..meshes.len()).filter(|&s| volumes[s] > 0.0).map(|s| vec![s]).collect();
+    let mut solids: Vec<Vec<usize>> = (0..meshes.len())
+        .filter(|&s| volumes[s] > 0.0)
+        .map(|s| vec![s])
+        .collect();
     for (shell, mesh) in meshes.iter().enumerate() {
         let Some(place) = mesh.first().map(|t| t[0]) else {
-            return Err(CadError::BadBrep { text: format!("shell {shell} has no faces") });
+            return Err(CadError::BadBrep {
+                text: format!("shell {shell} has no faces"),
+            });
         };
-        let around: Vec<i64> = (0..meshes.len()).map(|o| if o == shell { 0 } else { winding(&meshes[o], place) }).collect();
+        let around: Vec<i64> = (0..meshes.len())
+            .map(|o| {
+                if o == shell {
+                    0
+                } else {
+                    winding(&meshes[o], place)
+                }
+            })
+            .collect();
         let depth: i64 = around.iter().sum();
         let wanted = i64::from(volumes[shell] <= 0.0);
         let owner = (0..solids.len())
@@ -35,7 +52,14 @@ pub(crate) fn classify(brep: &Brep) -> Result<Vec<Vec<usize>>, CadError> {
         match (wanted, owner) {
             (0, _) if depth == 0 => {}
             (1, Some(owner)) if depth == 1 => solids[owner].push(shell),
-            _ => return Err(CadError::MisplacedShell { shell, volume: volumes[shell], depth, wanted }),
+            _ => {
+                return Err(CadError::MisplacedShell {
+                    shell,
+                    volume: volumes[shell],
+                    depth,
+                    wanted,
+                });
+            }
         }
     }
     Ok(solids)
@@ -43,7 +67,10 @@ pub(crate) fn classify(brep: &Brep) -> Result<Vec<Vec<usize>>, CadError> {
 
 fn triangulate(brep: &Brep, faces: &[u32]) -> Vec<[Vec3; 3]> {
     let mut out = Vec::new();
-    for patch in faces.iter().flat_map(|&f| patches::face_beziers(&brep.faces[f as usize])) {
+    for patch in faces
+        .iter()
+        .flat_map(|&f| patches::face_beziers(&brep.faces[f as usize]))
+    {
         patches::triangles(&patch, CELLS, &mut out);
     }
     out
@@ -51,7 +78,9 @@ fn triangulate(brep: &Brep, faces: &[u32]) -> Vec<[Vec3; 3]> {
 
 fn volume(mesh: &[[Vec3; 3]]) -> f64 {
     let base = mesh.first().map_or(Vec3::zeros(), |t| t[0]);
-    mesh.iter().map(|[a, b, c]| (a - base).dot(&(b - base).cross(&(c - base))) / 6.0).sum()
+    mesh.iter()
+        .map(|[a, b, c]| (a - base).dot(&(b - base).cross(&(c - base))) / 6.0)
+        .sum()
 }
 
 /// Winding number of a closed mesh about a point: sum of solid angles (van Oosterom & Strackee 1983, 10.1109/TBME.1983.325207).
