@@ -13,6 +13,7 @@ use super::pairing::{make_even, pair, split_all, split_rims};
 use super::polygons::Polygon;
 use super::reduce::{collapse_short, prune_spurs};
 use super::reference::Reference;
+use super::square::square_up;
 use super::tidy::Tidy;
 use super::walk::walk_triangles;
 use super::{QuadSkeleton, Skeleton, SkeletonError, stats, topology};
@@ -52,8 +53,8 @@ impl Default for SkeletonOptions {
             size_factor: 1.8,
             size_least: 2.0,
             size_most: 5.6,
-            member_width: 2.0,
-            member_size: 3.0,
+            member_width: 1.2,
+            member_size: 4.0,
             spur: 0.6,
             smoothing: 80,
         }
@@ -123,8 +124,10 @@ pub fn quad_skeleton(
         monitor.step(STAGE, "members", 0.3)?;
         burn_members(&mut c, unit, options, monitor)?;
         verify("burning members", c.betti())?;
-        prune_spurs(&mut c, 2.5 * unit, options.spur);
+        // Burning leaves a branch for every corner of the sheet: those are not members.
+        prune_spurs(&mut c, 3.0 * unit, (2.0 * options.spur).max(1.2 + 0.4 * options.member_width));
         c.compact();
+        collapse_short(&mut c, 0.6 * unit, unit, 2, monitor)?;
         let traced = arcs::trace(&c);
         arcs::smooth(&mut c, &traced, options.smoothing, 6);
         verify("pruning", c.betti())?;
@@ -214,7 +217,7 @@ fn clean(c: &mut Complex, unit: f64, options: &SkeletonOptions, monitor: &Monito
     Ok(())
 }
 
-/// Splits beams that cut a bend: an edge may subtend at most about one radian.
+/// Splits beams that cut a bend: an edge may subtend at most about 80 degrees.
 fn bend_beams(c: &mut Complex, reference: &Reference) {
     for _ in 0..4 {
         let beams: Vec<[u32; 2]> = c.alive_beams().collect();
@@ -223,7 +226,7 @@ fn bend_beams(c: &mut Complex, reference: &Reference) {
             let middle = (c.points[a as usize] + c.points[b as usize]) / 2.0;
             let Some((x, r)) = reference.on_arc(&middle, Class::Beam) else { continue };
             let (sagitta, length) = ((x - middle).norm(), c.length(a, b));
-            if sagitta > 0.12 * length && sagitta < 0.6 * length {
+            if sagitta > 0.18 * length && sagitta < 0.6 * length {
                 c.split(a, b, x, r);
                 split = true;
             }
@@ -272,6 +275,7 @@ fn quads(
         let mut tidy = Tidy { points: &mut points, radii: &mut radii, quads: polygons, beams: &beams, reference };
         tidy.run(monitor)?;
         polygons = tidy.quads;
+        square_up(&mut points, &mut radii, &polygons, &beams, reference);
         whole = !has_twins(&polygons);
     }
     if !whole {

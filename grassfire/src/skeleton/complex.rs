@@ -187,6 +187,7 @@ impl Complex {
     }
 
     /// The link condition: `Lk a` and `Lk b` meet in `Lk ab` only, so that contracting `ab` keeps the homotopy type.
+    /// An edge that is a component of its own does not pass: contracted to a bare point it would be lost.
     pub fn link_condition(&self, a: u32, b: u32) -> bool {
         let mut opposite: Vec<u32> = Vec::with_capacity(4);
         for &t in &self.vertex_triangles[a as usize] {
@@ -199,6 +200,9 @@ impl Complex {
         opposite.dedup();
         let other = self.neighbours(b);
         let mut common = self.neighbours(a);
+        if common == [b] && other == [a] {
+            return false;
+        }
         common.retain(|w| other.binary_search(w).is_ok());
         if common != opposite {
             return false;
