@@ -125,7 +125,7 @@ pub fn quad_skeleton(
         burn_members(&mut c, unit, options, monitor)?;
         verify("burning members", c.betti())?;
         // Burning leaves a branch for every corner of the sheet: those are not members.
-        prune_spurs(&mut c, 3.0 * unit, (2.0 * options.spur).max(1.2 + 0.4 * options.member_width));
+        prune_spurs(&mut c, 3.0 * unit, (2.0 * options.spur).max(1.2 + options.member_width));
         c.compact();
         collapse_short(&mut c, 0.6 * unit, unit, 2, monitor)?;
         let traced = arcs::trace(&c);
@@ -139,7 +139,7 @@ pub fn quad_skeleton(
     let reference = Reference::new(&c, &traced, 0.2 * unit);
     let sizing = sizing(options, median, spacing);
     coarsen(&mut c, &reference, &sizing, unit, monitor)?;
-    bend_beams(&mut c, &reference);
+    bend_beams(&mut c, &reference, unit);
     lengthen_balls(&mut c);
     verify("coarsening", c.betti())?;
 
@@ -218,7 +218,7 @@ fn clean(c: &mut Complex, unit: f64, options: &SkeletonOptions, monitor: &Monito
 }
 
 /// Splits beams that cut a bend: an edge may subtend at most about 80 degrees.
-fn bend_beams(c: &mut Complex, reference: &Reference) {
+fn bend_beams(c: &mut Complex, reference: &Reference, unit: f64) {
     for _ in 0..4 {
         let beams: Vec<[u32; 2]> = c.alive_beams().collect();
         let mut split = false;
@@ -226,7 +226,7 @@ fn bend_beams(c: &mut Complex, reference: &Reference) {
             let middle = (c.points[a as usize] + c.points[b as usize]) / 2.0;
             let Some((x, r)) = reference.on_arc(&middle, Class::Beam) else { continue };
             let (sagitta, length) = ((x - middle).norm(), c.length(a, b));
-            if sagitta > 0.18 * length && sagitta < 0.6 * length {
+            if length > 2.0 * unit && sagitta > 0.18 * length && sagitta < 0.6 * length {
                 c.split(a, b, x, r);
                 split = true;
             }
@@ -272,9 +272,9 @@ fn quads(
     let left = walk_triangles(&mut polygons, &beams, &points, monitor)?;
     let mut whole = left == 0;
     if whole {
-        let mut tidy = Tidy { points: &mut points, radii: &mut radii, quads: polygons, beams: &beams, reference };
+        let mut tidy = Tidy { points: &mut points, radii: &mut radii, quads: polygons, beams, reference };
         tidy.run(monitor)?;
-        polygons = tidy.quads;
+        (polygons, beams) = (tidy.quads, tidy.beams);
         square_up(&mut points, &mut radii, &polygons, &beams, reference);
         whole = !has_twins(&polygons);
     }

@@ -17,7 +17,7 @@ pub(crate) struct Tidy<'a> {
     pub points: &'a mut Vec<Vec3>,
     pub radii: &'a mut Vec<f64>,
     pub quads: Vec<Option<Polygon>>,
-    pub beams: &'a [[u32; 2]],
+    pub beams: Vec<[u32; 2]>,
     pub reference: &'a Reference,
 }
 
@@ -36,24 +36,25 @@ impl Tidy<'_> {
     /// Runs the clean-up; returns the number of operations.
     pub fn run(&mut self, monitor: &Monitor) -> Result<usize, Cancelled> {
         let tables = self.tables();
-        let fixed = self.fixed(&tables);
+        let mut fixed = self.fixed(&tables);
         let ideal = self.ideal(&tables, &fixed);
         self.relax(&fixed, 3);
         let mut total = 0;
         for _ in 0..MAX_BATCHES {
             monitor.check()?;
-            let saved = (self.quads.clone(), self.points.clone(), self.radii.clone());
+            let saved = (self.quads.clone(), self.beams.clone(), self.points.clone(), self.radii.clone());
             let topology = self.betti();
             let mut done = 0;
             while done < BATCH {
                 let tables = self.tables();
                 let Some(operation) = self.best(&tables, &fixed, &ideal) else { break };
                 self.apply(operation, &tables);
+                fixed = self.fixed(&self.tables());
                 self.relax(&fixed, 2);
                 done += 1;
             }
             if self.betti() != topology {
-                (self.quads, *self.points, *self.radii) = saved;
+                (self.quads, self.beams, *self.points, *self.radii) = saved;
                 break;
             }
             total += done;
@@ -67,7 +68,7 @@ impl Tidy<'_> {
 
     fn betti(&self) -> crate::topology::Betti {
         let list: Vec<Polygon> = self.quads.iter().flatten().copied().collect();
-        betti(self.points.len(), &list, self.beams)
+        betti(self.points.len(), &list, &self.beams)
     }
 
     fn tables(&self) -> Tables {
@@ -87,7 +88,7 @@ impl Tidy<'_> {
             fixed[e[0] as usize] = true;
             fixed[e[1] as usize] = true;
         }
-        for b in self.beams {
+        for b in &self.beams {
             fixed[b[0] as usize] = true;
             fixed[b[1] as usize] = true;
         }
@@ -181,18 +182,33 @@ impl Tidy<'_> {
     fn doublet(&self, tables: &Tables, fixed: &[bool]) -> Option<Operation> {
         for v in 0..self.points.len() as u32 {
             let [i, j] = tables.around[v as usize][..] else { continue };
-            if fixed[v as usize] {
+            if fixed[v as usize] && !self.only_foot(tables, v) {
                 continue;
             }
             let a = self.quads[i as usize]?.as_quad()?;
             let b = self.quads[j as usize]?.as_quad()?;
             let l = b.iter().position(|&w| w == v)?;
             let opposite = b[(l + 2) % 4];
-            if !a.contains(&opposite) {
+            if !a.contains(&opposite) && !self.beams_to(v).any(|w| self.linked(tables, w, opposite)) {
                 return Some(Operation::Doublet { keep: i, drop: j, vertex: v, opposite });
             }
         }
         None
+    }
+
+    /// A beam foot inside a sheet: nothing but the beam holds it, so it may slide to a neighbouring vertex.
+    fn only_foot(&self, tables: &Tables, v: u32) -> bool {
+        let Some(q) = tables.around[v as usize].first().and_then(|&i| self.quads[i as usize]) else { return false };
+        tables.around[v as usize].len() == 2
+            && q.corners().iter().filter(|&&w| tables.edges.at(v, w).len() == 2).count() == 2
+    }
+
+    fn beams_to(&self, v: u32) -> impl Iterator<Item = u32> {
+        self.beams.iter().filter(move |b| b.contains(&v)).map(move |b| if b[0] == v { b[1] } else { b[0] })
+    }
+
+    fn linked(&self, tables: &Tables, a: u32, b: u32) -> bool {
+        a == b || !tables.edges.at(a, b).is_empty() || self.beams.iter().any(|x| x.contains(&a) && x.contains(&b))
     }
 
     fn collapse(&self, i: u32, k: usize, tables: &Tables, fixed: &[bool], ideal: &[i64]) -> Option<(i64, Operation)> {
@@ -289,6 +305,9 @@ impl Tidy<'_> {
                 self.quads[keep as usize] =
                     self.quads[keep as usize].and_then(|q| renamed(&q, vertex, opposite));
                 self.quads[drop as usize] = None;
+                for end in self.beams.iter_mut().flatten().filter(|end| **end == vertex) {
+                    *end = opposite;
+                }
             }
             Operation::Collapse { quad, from, into } => {
                 self.quads[quad as usize] = None;
