@@ -79,7 +79,10 @@ fn smooth_pairs(c: &Complex, table: &EdgeTable) -> Vec<Pair> {
     let mut out = Vec::with_capacity(table.edges.len());
     for (edge, f) in table.iter() {
         if let [s, t] = *f {
-            out.push(Pair { edge, faces: [s, t] });
+            out.push(Pair {
+                edge,
+                faces: [s, t],
+            });
         }
         if f.len() < 3 {
             continue;
@@ -95,7 +98,10 @@ fn smooth_pairs(c: &Complex, table: &EdgeTable) -> Vec<Pair> {
             }
         }
         if let Some((_, i, j)) = flattest {
-            out.push(Pair { edge, faces: [f[i], f[j]] });
+            out.push(Pair {
+                edge,
+                faces: [f[i], f[j]],
+            });
         }
     }
     out
@@ -103,10 +109,18 @@ fn smooth_pairs(c: &Complex, table: &EdgeTable) -> Vec<Pair> {
 
 /// Unit vector in the plane of `t`, from its edge into the triangle.
 fn inward(c: &Complex, t: u32, [a, b]: [u32; 2]) -> Vec3 {
-    let apex = c.tri(t).into_iter().find(|&v| v != a && v != b).unwrap_or(a);
-    let along = (c.points[b as usize] - c.points[a as usize]).try_normalize(1e-12).unwrap_or_default();
+    let apex = c
+        .tri(t)
+        .into_iter()
+        .find(|&v| v != a && v != b)
+        .unwrap_or(a);
+    let along = (c.points[b as usize] - c.points[a as usize])
+        .try_normalize(1e-12)
+        .unwrap_or_default();
     let d = c.points[apex as usize] - c.points[a as usize];
-    (d - along * along.dot(&d)).try_normalize(1e-12).unwrap_or_default()
+    (d - along * along.dot(&d))
+        .try_normalize(1e-12)
+        .unwrap_or_default()
 }
 
 /// The complex cut open along its seams: one node for each fan of triangles at a vertex.
@@ -123,8 +137,13 @@ struct Cut {
 impl Cut {
     fn new(c: &Complex, pairs: &[Pair]) -> Self {
         let mut sets = UnionFind::new(3 * c.triangles.len());
-        let corner = |t: u32, v: u32| 3 * t + c.tri(t).iter().position(|&w| w == v).unwrap_or(0) as u32;
-        for &Pair { edge: [a, b], faces: [s, t] } in pairs {
+        let corner =
+            |t: u32, v: u32| 3 * t + c.tri(t).iter().position(|&w| w == v).unwrap_or(0) as u32;
+        for &Pair {
+            edge: [a, b],
+            faces: [s, t],
+        } in pairs
+        {
             sets.join(corner(s, a), corner(t, a));
             sets.join(corner(s, b), corner(t, b));
         }
@@ -159,7 +178,10 @@ impl Cut {
     }
 
     fn node_at(&self, t: u32, v: u32) -> u32 {
-        let k = self.triangles[t as usize].iter().position(|&w| w == v).unwrap_or(0);
+        let k = self.triangles[t as usize]
+            .iter()
+            .position(|&w| w == v)
+            .unwrap_or(0);
         self.node[t as usize][k]
     }
 
@@ -210,13 +232,22 @@ fn wide_faces(
 ) -> Vec<bool> {
     let half = options.member_width / 2.0;
     let radius = |t: u32| c.tri(t).iter().map(|&v| c.radii[v as usize]).sum::<f64>() / 3.0;
-    let depth = |t: u32| cut.node[t as usize].iter().map(|&n| distance[n as usize]).sum::<f64>() / 3.0;
+    let depth = |t: u32| {
+        cut.node[t as usize]
+            .iter()
+            .map(|&n| distance[n as usize])
+            .sum::<f64>()
+            / 3.0
+    };
     let n = c.triangles.len();
     let mut core = vec![false; n];
     for t in c.alive() {
         core[t as usize] = depth(t) > half * radius(t);
     }
-    let clear: Vec<u32> = c.alive().filter(|&t| depth(t) > CLEARLY * half * radius(t)).collect();
+    let clear: Vec<u32> = c
+        .alive()
+        .filter(|&t| depth(t) > CLEARLY * half * radius(t))
+        .collect();
     let mut sets = components(pairs, &core);
     let mut keep = vec![false; n];
     for t in clear {
@@ -243,11 +274,22 @@ fn wide_faces(
 
 /// Gives short necks between wide parts back to the sheet (hysteresis): a member must be longer than `GAP` radii, and a
 /// neck must not be narrower than half the member width.
-fn bridge_gaps(c: &Complex, pairs: &[Pair], cut: &Cut, distance: &[f64], half: f64, wide: &mut [bool]) {
+fn bridge_gaps(
+    c: &Complex,
+    pairs: &[Pair],
+    cut: &Cut,
+    distance: &[f64],
+    half: f64,
+    wide: &mut [bool],
+) {
     // Fronts: runs of pairs between a narrow and a wide face, joined where they share a vertex fan.
     let mut fronts = UnionFind::new(cut.vertex.len());
     let mut touched: Vec<u32> = Vec::new();
-    for &Pair { edge: [a, b], faces: [s, t] } in pairs {
+    for &Pair {
+        edge: [a, b],
+        faces: [s, t],
+    } in pairs
+    {
         if wide[s as usize] != wide[t as usize] {
             let (m, n) = (cut.node_at(s, a), cut.node_at(s, b));
             fronts.join(m, n);
@@ -303,8 +345,12 @@ fn bridge_gaps(c: &Complex, pairs: &[Pair], cut: &Cut, distance: &[f64], half: f
     let mut thick = vec![false; wide.len()];
     for &t in &bridge {
         let n = cut.node[t as usize];
-        let middle = n.iter().any(|&n| (near[n as usize][0].0 - near[n as usize][1].0).abs() < 0.3 * total(n));
-        let deep = n.iter().any(|&n| distance[n as usize] > 0.5 * half * c.radii[cut.vertex[n as usize] as usize]);
+        let middle = n
+            .iter()
+            .any(|&n| (near[n as usize][0].0 - near[n as usize][1].0).abs() < 0.3 * total(n));
+        let deep = n
+            .iter()
+            .any(|&n| distance[n as usize] > 0.5 * half * c.radii[cut.vertex[n as usize] as usize]);
         if middle && deep {
             thick[sets.find(t) as usize] = true;
         }
@@ -347,8 +393,13 @@ fn drop_tiny(c: &Complex, pairs: &[Pair], wide: &mut [bool], size: f64) {
 
 /// Burns the faces that are not wide, nearest to the rim first.
 fn burn(c: &mut Complex, cut: &Cut, distance: &[f64], wide: &[bool]) {
-    let depth =
-        |t: u32| cut.node[t as usize].iter().map(|&n| distance[n as usize]).sum::<f64>() / 3.0;
+    let depth = |t: u32| {
+        cut.node[t as usize]
+            .iter()
+            .map(|&n| distance[n as usize])
+            .sum::<f64>()
+            / 3.0
+    };
     // Rim distance of a vertex: the farthest of its fans, which is the one that burns last.
     let mut height = vec![0.0f64; c.points.len()];
     for (n, &v) in cut.vertex.iter().enumerate() {
@@ -357,8 +408,11 @@ fn burn(c: &mut Complex, cut: &Cut, distance: &[f64], wide: &[bool]) {
         }
     }
     let old_beams = c.beams.len();
-    let mut heap: BinaryHeap<Reverse<(Key, u32)>> =
-        c.alive().filter(|&t| !wide[t as usize]).map(|t| Reverse((Key(depth(t)), t))).collect();
+    let mut heap: BinaryHeap<Reverse<(Key, u32)>> = c
+        .alive()
+        .filter(|&t| !wide[t as usize])
+        .map(|t| Reverse((Key(depth(t)), t)))
+        .collect();
     let mut hairs: Vec<u32> = Vec::new();
     while let Some(Reverse((_, t))) = heap.pop() {
         if c.tri(t)[0] == super::complex::DEAD {
@@ -366,8 +420,14 @@ fn burn(c: &mut Complex, cut: &Cut, distance: &[f64], wide: &[bool]) {
         }
         let v = c.tri(t);
         let mut sides = [edge(v[0], v[1]), edge(v[1], v[2]), edge(v[2], v[0])];
-        sides.sort_by(|x, y| c.length(y[0], y[1]).total_cmp(&c.length(x[0], x[1])).then(x.cmp(y)));
-        let Some(&free) = sides.iter().find(|e| c.face_count(e[0], e[1]) == 1) else { continue };
+        sides.sort_by(|x, y| {
+            c.length(y[0], y[1])
+                .total_cmp(&c.length(x[0], x[1]))
+                .then(x.cmp(y))
+        });
+        let Some(&free) = sides.iter().find(|e| c.face_count(e[0], e[1]) == 1) else {
+            continue;
+        };
         c.remove_triangle(t);
         for e in sides {
             let faces = c.on_edge(e[0], e[1]);
@@ -385,13 +445,16 @@ fn burn(c: &mut Complex, cut: &Cut, distance: &[f64], wide: &[bool]) {
 }
 
 fn remove_hair(c: &mut Complex, tip: u32, old_beams: usize, height: &[f64], next: &mut Vec<u32>) {
-    let [beam] = c.vertex_beams[tip as usize][..] else { return };
+    let [beam] = c.vertex_beams[tip as usize][..] else {
+        return;
+    };
     if !c.vertex_triangles[tip as usize].is_empty() || (beam as usize) < old_beams {
         return;
     }
     let [p, q] = c.beams[beam as usize];
     let root = if p == tip { q } else { p };
-    let alone = c.vertex_beams[root as usize].len() == 1 && c.vertex_triangles[root as usize].is_empty();
+    let alone =
+        c.vertex_beams[root as usize].len() == 1 && c.vertex_triangles[root as usize].is_empty();
     let rise = height[root as usize] - height[tip as usize];
     if !alone && rise > HAIR * c.length(tip, root) {
         c.remove_beam(beam);
@@ -428,20 +491,40 @@ mod tests {
     fn ribbon_becomes_a_curve_and_plate_stays() {
         let mut ribbon = sheet(40, 2, |_, _| true);
         let before = ribbon.betti();
-        burn_members(&mut ribbon, 1.0, &SkeletonOptions::default(), &Monitor::default()).expect("not cancelled");
+        burn_members(
+            &mut ribbon,
+            1.0,
+            &SkeletonOptions::default(),
+            &Monitor::default(),
+        )
+        .expect("not cancelled");
         assert_eq!(ribbon.betti(), before);
         assert_eq!(ribbon.alive().count(), 0);
         assert!(ribbon.alive_beams().count() > 30);
         let mut plate = sheet(40, 20, |_, _| true);
-        burn_members(&mut plate, 1.0, &SkeletonOptions::default(), &Monitor::default()).expect("not cancelled");
+        burn_members(
+            &mut plate,
+            1.0,
+            &SkeletonOptions::default(),
+            &Monitor::default(),
+        )
+        .expect("not cancelled");
         assert!(plate.alive().count() > 1500);
     }
 
     #[test]
     fn narrow_ring_keeps_its_loop() {
-        let mut ring = sheet(20, 20, |x, y| !(2..18).contains(&x) || !(2..18).contains(&y));
+        let mut ring = sheet(20, 20, |x, y| {
+            !(2..18).contains(&x) || !(2..18).contains(&y)
+        });
         let before = ring.betti();
-        burn_members(&mut ring, 1.0, &SkeletonOptions::default(), &Monitor::default()).expect("not cancelled");
+        burn_members(
+            &mut ring,
+            1.0,
+            &SkeletonOptions::default(),
+            &Monitor::default(),
+        )
+        .expect("not cancelled");
         assert_eq!(ring.betti(), before);
         assert_eq!(ring.alive().count(), 0);
     }

@@ -19,7 +19,11 @@ pub(crate) fn square_up(
     beams: &[[u32; 2]],
     reference: &Reference,
 ) {
-    let quads: Vec<[u32; 4]> = polygons.iter().flatten().filter_map(Polygon::as_quad).collect();
+    let quads: Vec<[u32; 4]> = polygons
+        .iter()
+        .flatten()
+        .filter_map(Polygon::as_quad)
+        .collect();
     if quads.is_empty() {
         return;
     }
@@ -84,12 +88,18 @@ fn quality(points: &[Vec3], quads: &[[u32; 4]]) -> f64 {
 /// Corners of the rectangle nearest to a quad: same centre, mean side vectors turned to a right angle.
 fn rectangle(p: [Vec3; 4]) -> [Vec3; 4] {
     let centre = (p[0] + p[1] + p[2] + p[3]) / 4.0;
-    let (u, v) = ((p[1] + p[2] - p[0] - p[3]) / 2.0, (p[2] + p[3] - p[0] - p[1]) / 2.0);
+    let (u, v) = (
+        (p[1] + p[2] - p[0] - p[3]) / 2.0,
+        (p[2] + p[3] - p[0] - p[1]) / 2.0,
+    );
     let (lu, lv) = (u.norm(), v.norm());
     if lu < 1e-12 || lv < 1e-12 {
         return p;
     }
-    let (Some(e), Some(f)) = ((u / lu + v / lv).try_normalize(1e-9), (u / lu - v / lv).try_normalize(1e-9)) else {
+    let (Some(e), Some(f)) = (
+        (u / lu + v / lv).try_normalize(1e-9),
+        (u / lu - v / lv).try_normalize(1e-9),
+    ) else {
         return p;
     };
     // Sides drift toward their mean, else slivers would stay slivers.
@@ -97,7 +107,12 @@ fn rectangle(p: [Vec3; 4]) -> [Vec3; 4] {
     let (lu, lv) = (0.75 * lu + 0.25 * mean, 0.75 * lv + 0.25 * mean);
     let half = std::f64::consts::FRAC_1_SQRT_2 / 2.0;
     let (u, v) = ((e + f) * (half * lu), (e - f) * (half * lv));
-    [centre - u - v, centre + u - v, centre + u + v, centre - u + v]
+    [
+        centre - u - v,
+        centre + u - v,
+        centre + u + v,
+        centre - u + v,
+    ]
 }
 
 /// What may move: inside a sheet, along a smooth rim or seam, or not at all (`Corner`).
@@ -113,7 +128,10 @@ fn classes(points: &[Vec3], polygons: &[Option<Polygon>], beams: &[[u32; 2]]) ->
         .map(|v| {
             let smooth = |ends: &[u32]| {
                 let [a, b] = *ends else { return false };
-                angle(&(points[a as usize] - points[v]), &(points[b as usize] - points[v])) > 180.0 - SHARP
+                angle(
+                    &(points[a as usize] - points[v]),
+                    &(points[b as usize] - points[v]),
+                ) > 180.0 - SHARP
             };
             match (rim[v].len(), seam[v].len()) {
                 (0, 0) => Class::Interior,
@@ -135,11 +153,13 @@ mod tests {
 
     #[test]
     fn rectangles_stay_and_rhombi_straighten() {
-        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|p| Vec3::new(p[0], p[1], 0.0));
+        let square =
+            [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|p| Vec3::new(p[0], p[1], 0.0));
         for (p, q) in square.iter().zip(rectangle(square)) {
             assert!((p - q).norm() < 1e-12);
         }
-        let rhombus = [[0.0, 0.0], [1.0, 0.0], [1.5, 0.9], [0.5, 0.9]].map(|p| Vec3::new(p[0], p[1], 0.0));
+        let rhombus =
+            [[0.0, 0.0], [1.0, 0.0], [1.5, 0.9], [0.5, 0.9]].map(|p| Vec3::new(p[0], p[1], 0.0));
         let r = rectangle(rhombus);
         assert!((angle(&(r[1] - r[0]), &(r[3] - r[0])) - 90.0).abs() < 1e-9);
     }
