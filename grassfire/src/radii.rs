@@ -39,7 +39,11 @@ pub struct RadiiLayers {
 pub fn map(medial: &MedialMesh, skeleton: &mut Skeleton) {
     skeleton.radii.resize(skeleton.points.len(), f64::NAN);
     let spheres: Vec<usize> = (0..medial.points.len().min(medial.radii.len()))
-        .filter(|&i| medial.radii[i] > 0.0 && medial.radii[i].is_finite() && medial.points[i].iter().all(|x| x.is_finite()))
+        .filter(|&i| {
+            medial.radii[i] > 0.0
+                && medial.radii[i].is_finite()
+                && medial.points[i].iter().all(|x| x.is_finite())
+        })
         .collect();
     if spheres.is_empty() || skeleton.radii.iter().all(|r| r.is_finite()) {
         return;
@@ -90,7 +94,10 @@ pub fn smooth(skeleton: &mut Skeleton, passes: usize) -> RadiiLayers {
             skeleton.radii[v] = 0.5 * skeleton.radii[v] + 0.5 * sum[v] / valence[v];
         }
     }
-    RadiiLayers { mapped, smoothed: skeleton.radii.clone() }
+    RadiiLayers {
+        mapped,
+        smoothed: skeleton.radii.clone(),
+    }
 }
 
 #[cfg(test)]
@@ -111,7 +118,9 @@ mod tests {
     #[test]
     fn only_missing_radii_are_mapped() {
         let medial = MedialMesh {
-            points: (0..20).map(|i| Vec3::new(f64::from(i) / 5.0, 0.1, 0.0)).collect(),
+            points: (0..20)
+                .map(|i| Vec3::new(f64::from(i) / 5.0, 0.1, 0.0))
+                .collect(),
             radii: vec![2.0; 20],
             ..MedialMesh::default()
         };

@@ -44,7 +44,11 @@ pub(crate) fn trace(c: &Complex) -> Arcs {
     edges.sort_unstable_by_key(|e| e.0);
 
     let n = c.points.len();
-    let mut out = Arcs { arcs: Vec::new(), class: vec![None; n], along: vec![Vec::new(); n] };
+    let mut out = Arcs {
+        arcs: Vec::new(),
+        class: vec![None; n],
+        along: vec![Vec::new(); n],
+    };
     let mut incident: Vec<Vec<u32>> = vec![Vec::new(); n];
     for (i, (e, _)) in edges.iter().enumerate() {
         for k in 0..2 {
@@ -77,11 +81,16 @@ pub(crate) fn trace(c: &Complex) -> Arcs {
             if corner(at) || at == from {
                 break;
             }
-            let Some(&next) = incident[at as usize].iter().find(|&&e| !done[e as usize]) else { break };
+            let Some(&next) = incident[at as usize].iter().find(|&&e| !done[e as usize]) else {
+                break;
+            };
             done[next as usize] = true;
             path.push(other(&edges[next as usize].0, at));
         }
-        arcs.push(Arc { kind: edges[first as usize].1, vertices: path });
+        arcs.push(Arc {
+            kind: edges[first as usize].1,
+            vertices: path,
+        });
     }
     out.arcs = arcs;
     out
@@ -102,11 +111,15 @@ pub(crate) fn smooth(c: &mut Complex, arcs: &Arcs, arc_rounds: usize, sheet_roun
             _ => None,
         })
         .collect();
-    let corners: Vec<u32> = (0..n).filter(|&v| arcs.class[v as usize] == Some(Class::Corner)).collect();
+    let corners: Vec<u32> = (0..n)
+        .filter(|&v| arcs.class[v as usize] == Some(Class::Corner))
+        .collect();
     smooth_arcs(c, arcs, &plain, &corners, arc_rounds);
     let radii: Vec<f64> = plain
         .iter()
-        .map(|&(v, a, b)| 0.5 * c.radii[v as usize] + 0.25 * (c.radii[a as usize] + c.radii[b as usize]))
+        .map(|&(v, a, b)| {
+            0.5 * c.radii[v as usize] + 0.25 * (c.radii[a as usize] + c.radii[b as usize])
+        })
         .collect();
     for (&(v, _, _), r) in plain.iter().zip(radii) {
         c.radii[v as usize] = r;
@@ -114,7 +127,13 @@ pub(crate) fn smooth(c: &mut Complex, arcs: &Arcs, arc_rounds: usize, sheet_roun
     smooth_sheets(c, arcs, sheet_rounds);
 }
 
-fn smooth_arcs(c: &mut Complex, arcs: &Arcs, plain: &[(u32, u32, u32)], corners: &[u32], rounds: usize) {
+fn smooth_arcs(
+    c: &mut Complex,
+    arcs: &Arcs,
+    plain: &[(u32, u32, u32)],
+    corners: &[u32],
+    rounds: usize,
+) {
     let mut moved: Vec<Vec3> = Vec::with_capacity(plain.len());
     for round in 0..rounds {
         // The last two rounds only shrink: Taubin's second step would leave a ripple of one edge length.
@@ -143,9 +162,14 @@ fn smooth_corners(c: &mut Complex, arcs: &Arcs, corners: &[u32]) {
         .iter()
         .map(|&v| {
             let around = &arcs.along[v as usize];
-            let mean = around.iter().map(|&w| c.points[w as usize]).sum::<Vec3>() / around.len().max(1) as f64;
+            let mean = around.iter().map(|&w| c.points[w as usize]).sum::<Vec3>()
+                / around.len().max(1) as f64;
             // A free tip has nothing to balance it: it would only shorten.
-            if around.len() < 2 { c.points[v as usize] } else { (c.points[v as usize] + mean) / 2.0 }
+            if around.len() < 2 {
+                c.points[v as usize]
+            } else {
+                (c.points[v as usize] + mean) / 2.0
+            }
         })
         .collect();
     for (&v, x) in corners.iter().zip(moved) {

@@ -13,6 +13,7 @@ use super::pairing::{make_even, pair, split_all, split_rims};
 use super::polygons::Polygon;
 use super::reduce::{collapse_short, prune_spurs};
 use super::reference::Reference;
+use super::square::square_up;
 use super::tidy::Tidy;
 use super::walk::walk_triangles;
 use super::{QuadSkeleton, Skeleton, SkeletonError, stats, topology};
@@ -52,8 +53,8 @@ impl Default for SkeletonOptions {
             size_factor: 1.8,
             size_least: 2.0,
             size_most: 5.6,
-            member_width: 2.0,
-            member_size: 3.0,
+            member_width: 1.2,
+            member_size: 4.0,
             spur: 0.6,
             smoothing: 80,
         }
@@ -64,11 +65,27 @@ impl SkeletonOptions {
     fn check(&self, spacing: f64) -> Result<(), SkeletonError> {
         let positive = |name, value: f64| {
             let good = value > 0.0 && value.is_finite();
-            if good { Ok(()) } else { Err(SkeletonError::Option { name, value, range: "above 0" }) }
+            if good {
+                Ok(())
+            } else {
+                Err(SkeletonError::Option {
+                    name,
+                    value,
+                    range: "above 0",
+                })
+            }
         };
         let not_negative = |name, value: f64| {
             let good = value >= 0.0 && value.is_finite();
-            if good { Ok(()) } else { Err(SkeletonError::Option { name, value, range: "0 or more" }) }
+            if good {
+                Ok(())
+            } else {
+                Err(SkeletonError::Option {
+                    name,
+                    value,
+                    range: "0 or more",
+                })
+            }
         };
         positive("spacing", spacing)?;
         positive("skeleton.quad_size", self.quad_size.unwrap_or(1.0))?;
@@ -80,7 +97,11 @@ impl SkeletonOptions {
         not_negative("skeleton.spur", self.spur)?;
         if self.smoothing > 1000 {
             let value = self.smoothing as f64;
-            return Err(SkeletonError::Option { name: "skeleton.smoothing", value, range: "0 to 1000" });
+            return Err(SkeletonError::Option {
+                name: "skeleton.smoothing",
+                value,
+                range: "0 to 1000",
+            });
         }
         Ok(())
     }
@@ -110,7 +131,15 @@ pub fn quad_skeleton(
     let mut c = complex_of(medial)?;
     let expected = c.betti();
     let verify = |phase: &'static str, after: Betti| {
-        if after == expected { Ok(()) } else { Err(SkeletonError::Topology { phase, before: expected, after }) }
+        if after == expected {
+            Ok(())
+        } else {
+            Err(SkeletonError::Topology {
+                phase,
+                before: expected,
+                after,
+            })
+        }
     };
     let median = median_radius(&c);
     // Sizes follow the thickness; the voxel is only a lower bound.
@@ -123,8 +152,14 @@ pub fn quad_skeleton(
         monitor.step(STAGE, "members", 0.3)?;
         burn_members(&mut c, unit, options, monitor)?;
         verify("burning members", c.betti())?;
-        prune_spurs(&mut c, 2.5 * unit, options.spur);
+        // Burning leaves a branch for every corner of the sheet: those are not members.
+        prune_spurs(
+            &mut c,
+            3.0 * unit,
+            (2.0 * options.spur).max(1.2 + options.member_width),
+        );
         c.compact();
+        collapse_short(&mut c, 0.6 * unit, unit, 2, monitor)?;
         let traced = arcs::trace(&c);
         arcs::smooth(&mut c, &traced, options.smoothing, 6);
         verify("pruning", c.betti())?;
@@ -136,18 +171,28 @@ pub fn quad_skeleton(
     let reference = Reference::new(&c, &traced, 0.2 * unit);
     let sizing = sizing(options, median, spacing);
     coarsen(&mut c, &reference, &sizing, unit, monitor)?;
-    bend_beams(&mut c, &reference);
+    bend_beams(&mut c, &reference, unit);
     lengthen_balls(&mut c);
     verify("coarsening", c.betti())?;
 
     monitor.step(STAGE, "quads", 0.8)?;
     let (skeleton, whole) = quads(c, &reference, &sizing, monitor)?;
     if !whole {
-        monitor.warn(STAGE, format!("a sheet could not be paired into quads: all faces were split ({} quads)", skeleton.quads.len()));
+        monitor.warn(
+            STAGE,
+            format!(
+                "a sheet could not be paired into quads: all faces were split ({} quads)",
+                skeleton.quads.len()
+            ),
+        );
     }
     verify("meshing with quads", topology(&skeleton))?;
     check(&skeleton)?;
-    Ok(QuadSkeleton { topology: expected, stats: stats(&skeleton), skeleton })
+    Ok(QuadSkeleton {
+        topology: expected,
+        stats: stats(&skeleton),
+        skeleton,
+    })
 }
 
 fn complex_of(medial: &MedialMesh) -> Result<Complex, SkeletonError> {
@@ -155,15 +200,23 @@ fn complex_of(medial: &MedialMesh) -> Result<Complex, SkeletonError> {
     check_points(&medial.points, &medial.radii, false)?;
     check_cells("triangle", &medial.triangles, n)?;
     check_cells("edge", &medial.edges, n)?;
-    let mut keys: Vec<([u32; 3], u32)> = medial.triangles.iter().enumerate().map(|(i, t)| {
-        let mut key = *t;
-        key.sort_unstable();
-        (key, i as u32)
-    }).collect();
+    let mut keys: Vec<([u32; 3], u32)> = medial
+        .triangles
+        .iter()
+        .enumerate()
+        .map(|(i, t)| {
+            let mut key = *t;
+            key.sort_unstable();
+            (key, i as u32)
+        })
+        .collect();
     keys.sort_unstable();
     keys.dedup_by_key(|k| k.0);
     keys.sort_unstable_by_key(|k| k.1);
-    let triangles: Vec<[u32; 3]> = keys.iter().map(|k| medial.triangles[k.1 as usize]).collect();
+    let triangles: Vec<[u32; 3]> = keys
+        .iter()
+        .map(|k| medial.triangles[k.1 as usize])
+        .collect();
     let mut c = Complex::new(medial.points.clone(), medial.radii.clone(), &triangles, &[]);
     let mut beams: Vec<[u32; 2]> = medial.edges.iter().map(|e| edge(e[0], e[1])).collect();
     beams.sort_unstable();
@@ -196,13 +249,26 @@ fn median_radius(c: &Complex) -> f64 {
 
 fn sizing(options: &SkeletonOptions, median: f64, spacing: f64) -> Sizing {
     if let Some(size) = options.quad_size {
-        return Sizing { factor: 0.0, least: size, most: size };
+        return Sizing {
+            factor: 0.0,
+            least: size,
+            most: size,
+        };
     }
     let least = (options.size_least * median).max(2.0 * spacing);
-    Sizing { factor: options.size_factor, least, most: (options.size_most * median).max(least) }
+    Sizing {
+        factor: options.size_factor,
+        least,
+        most: (options.size_most * median).max(least),
+    }
 }
 
-fn clean(c: &mut Complex, unit: f64, options: &SkeletonOptions, monitor: &Monitor) -> Result<(), SkeletonError> {
+fn clean(
+    c: &mut Complex,
+    unit: f64,
+    options: &SkeletonOptions,
+    monitor: &Monitor,
+) -> Result<(), SkeletonError> {
     for (length, rounds) in [(0.9, 4), (0.6, 2)] {
         collapse_short(c, length * unit, unit, rounds, monitor)?;
         prune_spurs(c, 2.5 * unit, options.spur);
@@ -214,16 +280,18 @@ fn clean(c: &mut Complex, unit: f64, options: &SkeletonOptions, monitor: &Monito
     Ok(())
 }
 
-/// Splits beams that cut a bend: an edge may subtend at most about one radian.
-fn bend_beams(c: &mut Complex, reference: &Reference) {
+/// Splits beams that cut a bend: an edge may subtend at most about 80 degrees.
+fn bend_beams(c: &mut Complex, reference: &Reference, unit: f64) {
     for _ in 0..4 {
         let beams: Vec<[u32; 2]> = c.alive_beams().collect();
         let mut split = false;
         for [a, b] in beams {
             let middle = (c.points[a as usize] + c.points[b as usize]) / 2.0;
-            let Some((x, r)) = reference.on_arc(&middle, Class::Beam) else { continue };
+            let Some((x, r)) = reference.on_arc(&middle, Class::Beam) else {
+                continue;
+            };
             let (sagitta, length) = ((x - middle).norm(), c.length(a, b));
-            if sagitta > 0.12 * length && sagitta < 0.6 * length {
+            if length > 2.0 * unit && sagitta > 0.18 * length && sagitta < 0.6 * length {
                 c.split(a, b, x, r);
                 split = true;
             }
@@ -237,14 +305,20 @@ fn bend_beams(c: &mut Complex, reference: &Reference) {
 
 /// A component that shrank to one short beam (a ball) gets half a radius of length, so that it has a direction.
 fn lengthen_balls(c: &mut Complex) {
-    let tip = |c: &Complex, v: u32| c.vertex_beams[v as usize].len() == 1 && c.vertex_triangles[v as usize].is_empty();
+    let tip = |c: &Complex, v: u32| {
+        c.vertex_beams[v as usize].len() == 1 && c.vertex_triangles[v as usize].is_empty()
+    };
     let beams: Vec<[u32; 2]> = c.alive_beams().collect();
     for [a, b] in beams {
         let (i, j) = (a as usize, b as usize);
         let wanted = 0.25 * (c.radii[i] + c.radii[j]);
         let d = c.points[j] - c.points[i];
         if tip(c, a) && tip(c, b) && d.norm() < wanted {
-            let direction = if d.norm() > 1e-9 * wanted { d.normalize() } else { Vec3::x() };
+            let direction = if d.norm() > 1e-9 * wanted {
+                d.normalize()
+            } else {
+                Vec3::x()
+            };
             let centre = (c.points[i] + c.points[j]) / 2.0;
             c.points[i] = centre - direction * (wanted / 2.0);
             c.points[j] = centre + direction * (wanted / 2.0);
@@ -269,16 +343,32 @@ fn quads(
     let left = walk_triangles(&mut polygons, &beams, &points, monitor)?;
     let mut whole = left == 0;
     if whole {
-        let mut tidy = Tidy { points: &mut points, radii: &mut radii, quads: polygons, beams: &beams, reference };
+        let mut tidy = Tidy {
+            points: &mut points,
+            radii: &mut radii,
+            quads: polygons,
+            beams,
+            reference,
+        };
         tidy.run(monitor)?;
-        polygons = tidy.quads;
+        (polygons, beams) = (tidy.quads, tidy.beams);
+        square_up(&mut points, &mut radii, &polygons, &beams, reference);
         whole = !has_twins(&polygons);
     }
     if !whole {
         (polygons, beams) = split_all(&polygons, &beams, &mut points, &mut radii);
     }
-    let quads = polygons.iter().flatten().filter_map(Polygon::as_quad).collect();
-    let mut skeleton = Skeleton { points, radii, quads, beams };
+    let quads = polygons
+        .iter()
+        .flatten()
+        .filter_map(Polygon::as_quad)
+        .collect();
+    let mut skeleton = Skeleton {
+        points,
+        radii,
+        quads,
+        beams,
+    };
     split_lone_beams(&mut skeleton);
     drop_unused(&mut skeleton);
     Ok((skeleton, whole))
@@ -317,8 +407,10 @@ fn split_lone_beams(s: &mut Skeleton) {
             continue;
         }
         let m = s.points.len() as u32;
-        s.points.push((s.points[a as usize] + s.points[b as usize]) / 2.0);
-        s.radii.push((s.radii[a as usize] + s.radii[b as usize]) / 2.0);
+        s.points
+            .push((s.points[a as usize] + s.points[b as usize]) / 2.0);
+        s.radii
+            .push((s.radii[a as usize] + s.radii[b as usize]) / 2.0);
         out.extend([[a, m], [m, b]]);
     }
     s.beams = out;
@@ -335,5 +427,9 @@ fn drop_unused(s: &mut Skeleton) {
     }
     s.points = kept.iter().map(|&v| s.points[v]).collect();
     s.radii = kept.iter().map(|&v| s.radii[v]).collect();
-    s.quads.iter_mut().flatten().chain(s.beams.iter_mut().flatten()).for_each(|v| *v = new[*v as usize]);
+    s.quads
+        .iter_mut()
+        .flatten()
+        .chain(s.beams.iter_mut().flatten())
+        .for_each(|v| *v = new[*v as usize]);
 }

@@ -7,8 +7,8 @@
 //! 4. Relax; every vertex is put back onto its fine rim, seam, beam or sheet.
 
 use super::complex::{Class, Complex};
-use super::reference::Reference;
 use super::reduce::prune_spurs;
+use super::reference::Reference;
 use crate::Vec3;
 use crate::monitor::{Cancelled, Monitor};
 
@@ -72,7 +72,11 @@ pub(crate) fn coarsen(
 }
 
 fn split_long(c: &mut Complex, reference: &Reference, sizing: &Sizing) {
-    let mut edges: Vec<(f64, [u32; 2])> = c.edges().into_iter().map(|e| (c.length(e[0], e[1]), e)).collect();
+    let mut edges: Vec<(f64, [u32; 2])> = c
+        .edges()
+        .into_iter()
+        .map(|e| (c.length(e[0], e[1]), e))
+        .collect();
     edges.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
     for (l, [a, b]) in edges {
         if l > 4.0 / 3.0 * sizing.edge(c, a, b) && c.connected(a, b) {
@@ -100,7 +104,11 @@ fn collapse_short(c: &mut Complex, sizing: &Sizing, round: usize, unit: f64) {
             continue;
         }
         let (ka, kb) = (c.class(a), c.class(b));
-        let tries = if ka <= kb { [(a, b, ka, kb), (b, a, kb, ka)] } else { [(b, a, kb, ka), (a, b, ka, kb)] };
+        let tries = if ka <= kb {
+            [(a, b, ka, kb), (b, a, kb, ka)]
+        } else {
+            [(b, a, kb, ka), (a, b, ka, kb)]
+        };
         for (p, q, kp, kq) in tries {
             if try_collapse(c, p, q, [kp, kq], l / target, target, round, unit) {
                 break;
@@ -134,21 +142,31 @@ fn try_collapse(
         Class::Seam => faces >= 3,
         Class::Beam => beam,
         Class::Corner => {
-            kq == Class::Corner && (ratio < 0.75 && round > 0 && on_arc || ratio < 0.45 && round > 1)
+            kq == Class::Corner
+                && (ratio < 0.75 && round > 0 && on_arc || ratio < 0.45 && round > 1)
         }
     };
     if !allowed {
         return false;
     }
-    if kp != Class::Corner && c.neighbours(p).iter().any(|&w| w != q && c.length(q, w) > 1.5 * target) {
+    if kp != Class::Corner
+        && c.neighbours(p)
+            .iter()
+            .any(|&w| w != q && c.length(q, w) > 1.5 * target)
+    {
         return false;
     }
     let cos_min = if kp == Class::Corner { -0.2 } else { 0.3 };
-    if !c.link_condition(p, q) || c.would_flip(p, q, &c.points[q as usize], cos_min, 1e-2 * unit * unit) {
+    if !c.link_condition(p, q)
+        || c.would_flip(p, q, &c.points[q as usize], cos_min, 1e-2 * unit * unit)
+    {
         return false;
     }
     let (p, q) = (p as usize, q as usize);
-    let middle = ((c.points[p] + c.points[q]) / 2.0, (c.radii[p] + c.radii[q]) / 2.0);
+    let middle = (
+        (c.points[p] + c.points[q]) / 2.0,
+        (c.radii[p] + c.radii[q]) / 2.0,
+    );
     c.collapse(p as u32, q as u32);
     if kp == Class::Corner {
         (c.points[q], c.radii[q]) = middle;
@@ -177,12 +195,15 @@ fn flip(c: &mut Complex, a: u32, b: u32) {
     let on = c.on_edge(a, b);
     let [t0, t1] = on[..] else { return };
     let apex = |t: u32| c.tri(t).into_iter().find(|&w| w != a && w != b);
-    let (Some(x), Some(y)) = (apex(t0), apex(t1)) else { return };
+    let (Some(x), Some(y)) = (apex(t0), apex(t1)) else {
+        return;
+    };
     if x == y || c.is_beam(a, b) || c.connected(x, y) {
         return;
     }
     let sheet = c.sheet[t0 as usize];
-    let cost = |v: u32, change: i64| (sheet_valence(c, v, sheet) + change - ideal_valence(c, v)).pow(2);
+    let cost =
+        |v: u32, change: i64| (sheet_valence(c, v, sheet) + change - ideal_valence(c, v)).pow(2);
     let before = cost(a, 0) + cost(b, 0) + cost(x, 0) + cost(y, 0);
     let after = cost(a, -1) + cost(b, -1) + cost(x, 1) + cost(y, 1);
     let shorter = c.length(x, y).powi(2) < 0.8 * c.length(a, b).powi(2);
@@ -208,10 +229,19 @@ fn relax(c: &mut Complex, reference: &Reference) {
         let around: Vec<u32> = match c.class(v) {
             Class::Corner => continue,
             Class::Interior | Class::Beam => c.neighbours(v),
-            Class::Rim => c.neighbours(v).into_iter().filter(|&w| c.face_count(v, w) == 1).collect(),
-            Class::Seam => c.neighbours(v).into_iter().filter(|&w| c.face_count(v, w) >= 3).collect(),
+            Class::Rim => c
+                .neighbours(v)
+                .into_iter()
+                .filter(|&w| c.face_count(v, w) == 1)
+                .collect(),
+            Class::Seam => c
+                .neighbours(v)
+                .into_iter()
+                .filter(|&w| c.face_count(v, w) >= 3)
+                .collect(),
         };
-        let mean = around.iter().map(|&w| c.points[w as usize]).sum::<Vec3>() / around.len().max(1) as f64;
+        let mean =
+            around.iter().map(|&w| c.points[w as usize]).sum::<Vec3>() / around.len().max(1) as f64;
         moved.push((v, c.points[v as usize] * 0.4 + mean * 0.6));
     }
     for &(v, x) in &moved {

@@ -34,7 +34,12 @@ pub(crate) struct Complex {
 }
 
 impl Complex {
-    pub fn new(points: Vec<Vec3>, radii: Vec<f64>, triangles: &[[u32; 3]], beams: &[[u32; 2]]) -> Self {
+    pub fn new(
+        points: Vec<Vec3>,
+        radii: Vec<f64>,
+        triangles: &[[u32; 3]],
+        beams: &[[u32; 2]],
+    ) -> Self {
         let n = points.len();
         let mut c = Self {
             points,
@@ -128,16 +133,25 @@ impl Complex {
 
     /// Triangles on edge `ab`.
     pub fn on_edge(&self, a: u32, b: u32) -> Vec<u32> {
-        self.vertex_triangles[a as usize].iter().copied().filter(|&t| self.tri(t).contains(&b)).collect()
+        self.vertex_triangles[a as usize]
+            .iter()
+            .copied()
+            .filter(|&t| self.tri(t).contains(&b))
+            .collect()
     }
 
     /// How many triangles lie on edge `ab`.
     pub fn face_count(&self, a: u32, b: u32) -> usize {
-        self.vertex_triangles[a as usize].iter().filter(|&&t| self.tri(t).contains(&b)).count()
+        self.vertex_triangles[a as usize]
+            .iter()
+            .filter(|&&t| self.tri(t).contains(&b))
+            .count()
     }
 
     pub fn is_beam(&self, a: u32, b: u32) -> bool {
-        self.vertex_beams[a as usize].iter().any(|&x| self.beams[x as usize].contains(&b))
+        self.vertex_beams[a as usize]
+            .iter()
+            .any(|&x| self.beams[x as usize].contains(&b))
     }
 
     pub fn connected(&self, a: u32, b: u32) -> bool {
@@ -152,14 +166,23 @@ impl Complex {
         let triangles = &self.vertex_triangles[v as usize];
         let beams = self.vertex_beams[v as usize].len();
         if triangles.is_empty() {
-            return if beams == 2 { Class::Beam } else { Class::Corner };
+            return if beams == 2 {
+                Class::Beam
+            } else {
+                Class::Corner
+            };
         }
         if beams > 0 {
             return Class::Corner;
         }
         let mut spokes: Vec<(u32, u32)> = Vec::with_capacity(2 * triangles.len());
         for (i, &t) in triangles.iter().enumerate() {
-            spokes.extend(self.tri(t).into_iter().filter(|&w| w != v).map(|w| (w, i as u32)));
+            spokes.extend(
+                self.tri(t)
+                    .into_iter()
+                    .filter(|&w| w != v)
+                    .map(|w| (w, i as u32)),
+            );
         }
         spokes.sort_unstable();
         let mut fans = UnionFind::new(triangles.len());
@@ -187,6 +210,7 @@ impl Complex {
     }
 
     /// The link condition: `Lk a` and `Lk b` meet in `Lk ab` only, so that contracting `ab` keeps the homotopy type.
+    /// An edge that is a component of its own does not pass: contracted to a bare point it would be lost.
     pub fn link_condition(&self, a: u32, b: u32) -> bool {
         let mut opposite: Vec<u32> = Vec::with_capacity(4);
         for &t in &self.vertex_triangles[a as usize] {
@@ -199,6 +223,9 @@ impl Complex {
         opposite.dedup();
         let other = self.neighbours(b);
         let mut common = self.neighbours(a);
+        if common == [b] && other == [a] {
+            return false;
+        }
         common.retain(|w| other.binary_search(w).is_ok());
         if common != opposite {
             return false;
@@ -213,8 +240,13 @@ impl Complex {
                 edge(x, y)
             }
         };
-        let link: Vec<[u32; 2]> = self.vertex_triangles[a as usize].iter().map(|&t| far(t, a)).collect();
-        !self.vertex_triangles[b as usize].iter().any(|&t| link.contains(&far(t, b)))
+        let link: Vec<[u32; 2]> = self.vertex_triangles[a as usize]
+            .iter()
+            .map(|&t| far(t, a))
+            .collect();
+        !self.vertex_triangles[b as usize]
+            .iter()
+            .any(|&t| link.contains(&far(t, b)))
     }
 
     /// Would moving `a` to `target` (contracting `ab`) fold or flatten a triangle?
@@ -225,15 +257,23 @@ impl Complex {
                 continue;
             }
             let p = t.map(|w| self.points[w as usize]);
-            let q = t.map(|w| if w == a { *target } else { self.points[w as usize] });
+            let q = t.map(|w| {
+                if w == a {
+                    *target
+                } else {
+                    self.points[w as usize]
+                }
+            });
             let n1 = (p[1] - p[0]).cross(&(p[2] - p[0]));
             let n2 = (q[1] - q[0]).cross(&(q[2] - q[0]));
             let (l1, l2) = (n1.norm(), n2.norm());
             if l1 < tiny {
                 continue;
             }
-            let longest =
-                (q[1] - q[0]).norm_squared().max((q[2] - q[0]).norm_squared()).max((q[2] - q[1]).norm_squared());
+            let longest = (q[1] - q[0])
+                .norm_squared()
+                .max((q[2] - q[0]).norm_squared())
+                .max((q[2] - q[1]).norm_squared());
             if l2 < 0.08 * longest || n1.dot(&n2) < cos_min * l1 * l2 {
                 return true;
             }
@@ -308,7 +348,9 @@ impl Complex {
 
     /// Vertices in use, ascending.
     pub fn vertices(&self) -> Vec<u32> {
-        (0..self.points.len() as u32).filter(|&v| self.used(v)).collect()
+        (0..self.points.len() as u32)
+            .filter(|&v| self.used(v))
+            .collect()
     }
 
     /// Edge table of the alive triangles.
@@ -354,9 +396,15 @@ impl Complex {
             new[v as usize] = i as u32;
         }
         let ids: Vec<u32> = self.alive().collect();
-        let triangles: Vec<[u32; 3]> = ids.iter().map(|&t| self.tri(t).map(|v| new[v as usize])).collect();
+        let triangles: Vec<[u32; 3]> = ids
+            .iter()
+            .map(|&t| self.tri(t).map(|v| new[v as usize]))
+            .collect();
         let sheet = ids.iter().map(|&t| self.sheet[t as usize]).collect();
-        let beams: Vec<[u32; 2]> = self.alive_beams().map(|b| b.map(|v| new[v as usize])).collect();
+        let beams: Vec<[u32; 2]> = self
+            .alive_beams()
+            .map(|b| b.map(|v| new[v as usize]))
+            .collect();
         let points = vertices.iter().map(|&v| self.points[v as usize]).collect();
         let radii = vertices.iter().map(|&v| self.radii[v as usize]).collect();
         *self = Self::new(points, radii, &triangles, &beams);
@@ -369,8 +417,15 @@ mod tests {
     use super::*;
 
     fn strip() -> Complex {
-        let points = (0..6).map(|i| Vec3::new((i / 2) as f64, (i % 2) as f64, 0.0)).collect();
-        Complex::new(points, vec![1.0; 6], &[[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]], &[])
+        let points = (0..6)
+            .map(|i| Vec3::new((i / 2) as f64, (i % 2) as f64, 0.0))
+            .collect();
+        Complex::new(
+            points,
+            vec![1.0; 6],
+            &[[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]],
+            &[],
+        )
     }
 
     #[test]
@@ -394,7 +449,12 @@ mod tests {
     #[test]
     fn link_condition_refuses_to_close_a_loop() {
         let none: [[u32; 3]; 0] = [];
-        let c = Complex::new(vec![Vec3::zeros(); 3], vec![1.0; 3], &none, &[[0, 1], [1, 2], [2, 0]]);
+        let c = Complex::new(
+            vec![Vec3::zeros(); 3],
+            vec![1.0; 3],
+            &none,
+            &[[0, 1], [1, 2], [2, 0]],
+        );
         assert!(!c.link_condition(0, 1));
         assert!(strip().link_condition(0, 1));
     }

@@ -27,7 +27,10 @@ impl EdgeTable {
             }
         }
         list.sort_unstable();
-        let mut table = Self { faces: Vec::with_capacity(list.len()), ..Self::default() };
+        let mut table = Self {
+            faces: Vec::with_capacity(list.len()),
+            ..Self::default()
+        };
         for (e, f) in list {
             if table.edges.last() != Some(&e) {
                 table.edges.push(e);
@@ -55,7 +58,10 @@ impl EdgeTable {
 
     /// Edges with their faces, in order.
     pub fn iter(&self) -> impl Iterator<Item = ([u32; 2], &[u32])> {
-        self.edges.iter().enumerate().map(|(i, e)| (*e, self.faces(i)))
+        self.edges
+            .iter()
+            .enumerate()
+            .map(|(i, e)| (*e, self.faces(i)))
     }
 }
 
@@ -90,7 +96,12 @@ impl UnionFind {
 /// `b2` is the dimension of the 2-cycles over GF(2): a cycle is constant on a sheet (faces joined over edges with two
 /// faces), zero on a sheet with a rim, and sums to zero at every seam.
 pub(crate) fn betti<F: AsRef<[u32]>>(points: usize, faces: &[F], beams: &[[u32; 2]]) -> Betti {
-    let table = EdgeTable::new(faces.iter().enumerate().map(|(i, f)| (i as u32, f.as_ref())));
+    let table = EdgeTable::new(
+        faces
+            .iter()
+            .enumerate()
+            .map(|(i, f)| (i as u32, f.as_ref())),
+    );
     let mut bare: Vec<[u32; 2]> = beams.iter().map(|b| edge(b[0], b[1])).collect();
     bare.sort_unstable();
     bare.dedup();
@@ -104,7 +115,9 @@ pub(crate) fn betti<F: AsRef<[u32]>>(points: usize, faces: &[F], beams: &[[u32; 
         used[e[1] as usize] = true;
     }
     let vertices = used.iter().filter(|u| **u).count() as i64;
-    let b0 = (0..points as u32).filter(|&v| used[v as usize] && sets.find(v) == v).count() as i64;
+    let b0 = (0..points as u32)
+        .filter(|&v| used[v as usize] && sets.find(v) == v)
+        .count() as i64;
     let chi = vertices - (table.edges.len() + bare.len()) as i64 + faces.len() as i64;
     Betti::from_chi(b0, closed_cycles(&table, faces.len()), chi)
 }
@@ -156,7 +169,9 @@ fn closed_cycles(table: &EdgeTable, faces: usize) -> i64 {
     rows.retain(|row| !row.is_empty());
     rows.sort_unstable();
     rows.dedup();
-    let free = (0..faces as u32).filter(|&f| sheets.find(f) == f && !open[f as usize]).count();
+    let free = (0..faces as u32)
+        .filter(|&f| sheets.find(f) == f && !open[f as usize])
+        .count();
     (free - rank(rows)) as i64
 }
 
@@ -212,21 +227,61 @@ mod tests {
 
     #[test]
     fn sphere_has_one_cavity() {
-        assert_eq!(betti(4, &TETRAHEDRON, &[]), Betti { b0: 1, b1: 0, b2: 1, chi: 2 });
+        assert_eq!(
+            betti(4, &TETRAHEDRON, &[]),
+            Betti {
+                b0: 1,
+                b1: 0,
+                b2: 1,
+                chi: 2
+            }
+        );
     }
 
     #[test]
     fn two_cells_share_a_wall() {
         // Two tetrahedra glued along 0-1-2, the wall kept: two cavities, three sheets at the seams.
-        let faces = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3], [0, 1, 4], [0, 2, 4], [1, 2, 4]];
-        assert_eq!(betti(5, &faces, &[]), Betti { b0: 1, b1: 0, b2: 2, chi: 3 });
+        let faces = [
+            [0, 1, 2],
+            [0, 1, 3],
+            [0, 2, 3],
+            [1, 2, 3],
+            [0, 1, 4],
+            [0, 2, 4],
+            [1, 2, 4],
+        ];
+        assert_eq!(
+            betti(5, &faces, &[]),
+            Betti {
+                b0: 1,
+                b1: 0,
+                b2: 2,
+                chi: 3
+            }
+        );
     }
 
     #[test]
     fn loop_and_unused_points() {
         let none: [[u32; 3]; 0] = [];
-        assert_eq!(betti(9, &none, &[[3, 4], [4, 5], [5, 3]]), Betti { b0: 1, b1: 1, b2: 0, chi: 0 });
+        assert_eq!(
+            betti(9, &none, &[[3, 4], [4, 5], [5, 3]]),
+            Betti {
+                b0: 1,
+                b1: 1,
+                b2: 0,
+                chi: 0
+            }
+        );
         // A bare edge that a face already has counts once.
-        assert_eq!(betti(4, &[[0, 1, 2]], &[[0, 1], [2, 3]]), Betti { b0: 1, b1: 0, b2: 0, chi: 1 });
+        assert_eq!(
+            betti(4, &[[0, 1, 2]], &[[0, 1], [2, 3]]),
+            Betti {
+                b0: 1,
+                b1: 0,
+                b2: 0,
+                chi: 1
+            }
+        );
     }
 }

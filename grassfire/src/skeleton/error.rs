@@ -102,12 +102,24 @@ impl SkeletonError {
     /// What the user can do about it.
     pub fn hint(&self) -> Option<String> {
         let text = match self {
-            Self::Empty(_) => "the medial axis was pruned away: use a finer voxel size or a smaller pruning threshold",
-            Self::Isolated { .. } => "delete loose points before saving the skeleton (Blender: Mesh > Clean Up > Delete Loose)",
-            Self::Duplicate { .. } => "merge or delete doubled faces (Blender: Mesh > Clean Up > Merge by Distance)",
-            Self::Degenerate { .. } => "dissolve degenerate faces (Blender: Mesh > Clean Up > Degenerate Dissolve)",
-            Self::Topology { .. } => "please report this part; a different skeleton.quad_size may get round it",
-            Self::BadRadius { .. } | Self::RadiiCount { .. } => "leave the radius property out: radii are then taken from the part",
+            Self::Empty(_) => {
+                "the medial axis was pruned away: use a finer voxel size or a smaller pruning threshold"
+            }
+            Self::Isolated { .. } => {
+                "delete loose points before saving the skeleton (Blender: Mesh > Clean Up > Delete Loose)"
+            }
+            Self::Duplicate { .. } => {
+                "merge or delete doubled faces (Blender: Mesh > Clean Up > Merge by Distance)"
+            }
+            Self::Degenerate { .. } => {
+                "dissolve degenerate faces (Blender: Mesh > Clean Up > Degenerate Dissolve)"
+            }
+            Self::Topology { .. } => {
+                "please report this part; a different skeleton.quad_size may get round it"
+            }
+            Self::BadRadius { .. } | Self::RadiiCount { .. } => {
+                "leave the radius property out: radii are then taken from the part"
+            }
             _ => return None,
         };
         Some(text.to_owned())

@@ -1,8 +1,10 @@
 //! Narrow and tiny sheets burnt to beams, so that slender members do not flicker between sheet and beam.
 //!
-//! 1. Cut the complex open along its seams and measure, inside each sheet, the distance to the rim.
+//! 1. Measure, inside each sheet, the distance to the rim. At a seam the two flattest faces go on into each other; the
+//!    others end there, which is not a rim.
 //! 2. Core: faces farther than half the member width from the rim; a core must somewhere be clearly wider (hysteresis).
-//! 3. Wide: everything within that distance of a core (a geodesic opening); pieces smaller than the member size drop out.
+//! 3. Wide: everything within that distance of a core (a geodesic opening); short gaps
+//!    between wide parts are filled, pieces smaller than the member size drop out.
 //! 4. The rest burns from its free edges inward, in the order of the distance: elementary collapses, so the homotopy type
 //!    stays. Hairs that run straight toward the rim go at once; real spurs are left to the pruning by protrusion.
 
@@ -12,6 +14,7 @@ use std::collections::BinaryHeap;
 use super::build::SkeletonOptions;
 use super::complex::Complex;
 use super::edges::{EdgeTable, UnionFind, edge};
+use crate::Vec3;
 use crate::monitor::{Cancelled, Monitor};
 
 /// A core must somewhere be wider than the member width by this factor.
@@ -20,6 +23,10 @@ const CLEARLY: f64 = 1.25;
 const REACH: f64 = 1.2;
 /// A dangling edge whose rim distance falls faster than this toward its tip is a hair, not a member.
 const HAIR: f64 = 0.4;
+/// A gap between wide parts shorter than this many radii is no member.
+const GAP: f64 = 2.5;
+/// Two faces at a seam go on into each other when the cosine between them is below this (150 degrees and flatter).
+const FLAT: f64 = -0.85;
 
 /// Total order for the heap; the values are never NaN.
 #[derive(PartialEq)]
@@ -50,14 +57,70 @@ pub(crate) fn burn_members(
         return Ok(());
     }
     let table = c.edge_table();
-    let cut = Cut::new(c, &table);
+    let pairs = smooth_pairs(c, &table);
+    let cut = Cut::new(c, &pairs);
     let distance = cut.distances(&cut.rim_nodes(&table), f64::INFINITY);
     monitor.check()?;
-    let wide = wide_faces(c, &table, &cut, &distance, unit, options);
+    let wide = wide_faces(c, &pairs, &cut, &distance, unit, options);
     monitor.check()?;
     burn(c, &cut, &distance, &wide);
     c.compact();
     Ok(())
+}
+
+/// Two faces that go on into each other over an edge.
+struct Pair {
+    edge: [u32; 2],
+    faces: [u32; 2],
+}
+
+/// Pairs over edges with two faces, and at every seam edge the two faces nearest to lying in one plane.
+fn smooth_pairs(c: &Complex, table: &EdgeTable) -> Vec<Pair> {
+    let mut out = Vec::with_capacity(table.edges.len());
+    for (edge, f) in table.iter() {
+        if let [s, t] = *f {
+            out.push(Pair {
+                edge,
+                faces: [s, t],
+            });
+        }
+        if f.len() < 3 {
+            continue;
+        }
+        let inward: Vec<Vec3> = f.iter().map(|&t| inward(c, t, edge)).collect();
+        let mut flattest: Option<(f64, usize, usize)> = None;
+        for i in 0..f.len() {
+            for j in i + 1..f.len() {
+                let cos = inward[i].dot(&inward[j]);
+                if cos < FLAT && flattest.is_none_or(|b| cos < b.0) {
+                    flattest = Some((cos, i, j));
+                }
+            }
+        }
+        if let Some((_, i, j)) = flattest {
+            out.push(Pair {
+                edge,
+                faces: [f[i], f[j]],
+            });
+        }
+    }
+    out
+}
+
+/// Unit vector in the plane of `t`, from its edge into the triangle.
+fn inward(c: &Complex, t: u32, [a, b]: [u32; 2]) -> Vec3 {
+    let apex = c
+        .tri(t)
+        .into_iter()
+        .find(|&v| v != a && v != b)
+        .unwrap_or(a);
+    let along = (c.points[b as usize] - c.points[a as usize])
+        .try_normalize(1e-12)
+        .unwrap_or_default();
+    let d = c.points[apex as usize] - c.points[a as usize];
+    (d - along * along.dot(&d))
+        .try_normalize(1e-12)
+        .unwrap_or_default()
 }
 
 /// The complex cut open along its seams: one node for each fan of triangles at a vertex.
@@ -72,14 +135,17 @@ struct Cut {
 }
 
 impl Cut {
-    fn new(c: &Complex, table: &EdgeTable) -> Self {
+    fn new(c: &Complex, pairs: &[Pair]) -> Self {
         let mut sets = UnionFind::new(3 * c.triangles.len());
-        let corner = |t: u32, v: u32| 3 * t + c.tri(t).iter().position(|&w| w == v).unwrap_or(0) as u32;
-        for ([a, b], f) in table.iter() {
-            if let [s, t] = *f {
-                sets.join(corner(s, a), corner(t, a));
-                sets.join(corner(s, b), corner(t, b));
-            }
+        let corner =
+            |t: u32, v: u32| 3 * t + c.tri(t).iter().position(|&w| w == v).unwrap_or(0) as u32;
+        for &Pair {
+            edge: [a, b],
+            faces: [s, t],
+        } in pairs
+        {
+            sets.join(corner(s, a), corner(t, a));
+            sets.join(corner(s, b), corner(t, b));
         }
         let mut name = vec![u32::MAX; 3 * c.triangles.len()];
         let mut cut = Self {
@@ -112,7 +178,10 @@ impl Cut {
     }
 
     fn node_at(&self, t: u32, v: u32) -> u32 {
-        let k = self.triangles[t as usize].iter().position(|&w| w == v).unwrap_or(0);
+        let k = self.triangles[t as usize]
+            .iter()
+            .position(|&w| w == v)
+            .unwrap_or(0);
         self.node[t as usize][k]
     }
 
@@ -155,7 +224,7 @@ impl Cut {
 /// True for faces that stay a sheet.
 fn wide_faces(
     c: &Complex,
-    table: &EdgeTable,
+    pairs: &[Pair],
     cut: &Cut,
     distance: &[f64],
     unit: f64,
@@ -163,14 +232,23 @@ fn wide_faces(
 ) -> Vec<bool> {
     let half = options.member_width / 2.0;
     let radius = |t: u32| c.tri(t).iter().map(|&v| c.radii[v as usize]).sum::<f64>() / 3.0;
-    let depth = |t: u32| cut.node[t as usize].iter().map(|&n| distance[n as usize]).sum::<f64>() / 3.0;
+    let depth = |t: u32| {
+        cut.node[t as usize]
+            .iter()
+            .map(|&n| distance[n as usize])
+            .sum::<f64>()
+            / 3.0
+    };
     let n = c.triangles.len();
     let mut core = vec![false; n];
     for t in c.alive() {
         core[t as usize] = depth(t) > half * radius(t);
     }
-    let clear: Vec<u32> = c.alive().filter(|&t| depth(t) > CLEARLY * half * radius(t)).collect();
-    let mut sets = components(table, &core);
+    let clear: Vec<u32> = c
+        .alive()
+        .filter(|&t| depth(t) > CLEARLY * half * radius(t))
+        .collect();
+    let mut sets = components(pairs, &core);
     let mut keep = vec![false; n];
     for t in clear {
         keep[sets.find(t) as usize] = true;
@@ -189,26 +267,112 @@ fn wide_faces(
         };
         wide[t as usize] = cut.node[t as usize].iter().all(near);
     }
-    drop_tiny(c, table, &mut wide, options.member_size);
+    bridge_gaps(c, pairs, cut, distance, half, &mut wide);
+    drop_tiny(c, pairs, &mut wide, options.member_size);
     wide
 }
 
-/// Face sets joined over edges with two faces that both belong to `set`.
-fn components(table: &EdgeTable, set: &[bool]) -> UnionFind {
+/// Gives short necks between wide parts back to the sheet (hysteresis): a member must be longer than `GAP` radii, and a
+/// neck must not be narrower than half the member width.
+fn bridge_gaps(
+    c: &Complex,
+    pairs: &[Pair],
+    cut: &Cut,
+    distance: &[f64],
+    half: f64,
+    wide: &mut [bool],
+) {
+    // Fronts: runs of pairs between a narrow and a wide face, joined where they share a vertex fan.
+    let mut fronts = UnionFind::new(cut.vertex.len());
+    let mut touched: Vec<u32> = Vec::new();
+    for &Pair {
+        edge: [a, b],
+        faces: [s, t],
+    } in pairs
+    {
+        if wide[s as usize] != wide[t as usize] {
+            let (m, n) = (cut.node_at(s, a), cut.node_at(s, b));
+            fronts.join(m, n);
+            touched.extend([m, n]);
+        }
+    }
+    touched.sort_unstable();
+    touched.dedup();
+    let narrow: Vec<u32> = c.alive().filter(|&t| !wide[t as usize]).collect();
+    let mut inside = vec![false; cut.vertex.len()];
+    for &t in &narrow {
+        for n in cut.node[t as usize] {
+            inside[n as usize] = true;
+        }
+    }
+    // The two nearest fronts of every node, by one search that lets two fronts pass a node.
+    let mut near: Vec<[(f64, u32); 2]> = vec![[(f64::INFINITY, u32::MAX); 2]; cut.vertex.len()];
+    let mut heap = BinaryHeap::new();
+    for &n in &touched {
+        heap.push(Reverse((Key(0.0), n, fronts.find(n))));
+    }
+    while let Some(Reverse((Key(d), n, front))) = heap.pop() {
+        let slot = &mut near[n as usize];
+        if slot[0].1 == u32::MAX {
+            slot[0] = (d, front);
+        } else if slot[0].1 != front && slot[1].1 == u32::MAX {
+            slot[1] = (d, front);
+        } else {
+            continue;
+        }
+        let limit = GAP * c.radii[cut.vertex[n as usize] as usize];
+        for &(m, step) in &cut.near[n as usize] {
+            if inside[m as usize] && d + step <= limit {
+                heap.push(Reverse((Key(d + step), m, front)));
+            }
+        }
+    }
+    let total = |n: u32| near[n as usize][0].0 + near[n as usize][1].0;
+    let bridge: Vec<u32> = narrow
+        .into_iter()
+        .filter(|&t| {
+            let n = cut.node[t as usize];
+            let r = c.tri(t).iter().map(|&v| c.radii[v as usize]).sum::<f64>() / 3.0;
+            n.iter().map(|&n| total(n)).sum::<f64>() / 3.0 <= GAP * r
+        })
+        .collect();
+    // Only where the neck is not too thin at its middle.
+    let mut members = vec![false; wide.len()];
+    for &t in &bridge {
+        members[t as usize] = true;
+    }
+    let mut sets = components(pairs, &members);
+    let mut thick = vec![false; wide.len()];
+    for &t in &bridge {
+        let n = cut.node[t as usize];
+        let middle = n
+            .iter()
+            .any(|&n| (near[n as usize][0].0 - near[n as usize][1].0).abs() < 0.3 * total(n));
+        let deep = n
+            .iter()
+            .any(|&n| distance[n as usize] > 0.5 * half * c.radii[cut.vertex[n as usize] as usize]);
+        if middle && deep {
+            thick[sets.find(t) as usize] = true;
+        }
+    }
+    for &t in &bridge {
+        wide[t as usize] = thick[sets.find(t) as usize];
+    }
+}
+
+/// Faces of `set` joined over the pairs.
+fn components(pairs: &[Pair], set: &[bool]) -> UnionFind {
     let mut sets = UnionFind::new(set.len());
-    for (_, f) in table.iter() {
-        if let [s, t] = *f
-            && set[s as usize]
-            && set[t as usize]
-        {
+    for &Pair { faces: [s, t], .. } in pairs {
+        if set[s as usize] && set[t as usize] {
             sets.join(s, t);
         }
     }
     sets
 }
 
-fn drop_tiny(c: &Complex, table: &EdgeTable, wide: &mut [bool], size: f64) {
-    let mut sets = components(table, wide);
+fn drop_tiny(c: &Complex, pairs: &[Pair], wide: &mut [bool], size: f64) {
+    let mut sets = components(pairs, wide);
     let mut area = vec![0.0; wide.len()];
     let mut weighted = vec![0.0; wide.len()];
     for t in c.alive().filter(|&t| wide[t as usize]) {
@@ -229,8 +393,13 @@ fn drop_tiny(c: &Complex, table: &EdgeTable, wide: &mut [bool], size: f64) {
 
 /// Burns the faces that are not wide, nearest to the rim first.
 fn burn(c: &mut Complex, cut: &Cut, distance: &[f64], wide: &[bool]) {
-    let depth =
-        |t: u32| cut.node[t as usize].iter().map(|&n| distance[n as usize]).sum::<f64>() / 3.0;
+    let depth = |t: u32| {
+        cut.node[t as usize]
+            .iter()
+            .map(|&n| distance[n as usize])
+            .sum::<f64>()
+            / 3.0
+    };
     // Rim distance of a vertex: the farthest of its fans, which is the one that burns last.
     let mut height = vec![0.0f64; c.points.len()];
     for (n, &v) in cut.vertex.iter().enumerate() {
@@ -239,8 +408,11 @@ fn burn(c: &mut Complex, cut: &Cut, distance: &[f64], wide: &[bool]) {
         }
     }
     let old_beams = c.beams.len();
-    let mut heap: BinaryHeap<Reverse<(Key, u32)>> =
-        c.alive().filter(|&t| !wide[t as usize]).map(|t| Reverse((Key(depth(t)), t))).collect();
+    let mut heap: BinaryHeap<Reverse<(Key, u32)>> = c
+        .alive()
+        .filter(|&t| !wide[t as usize])
+        .map(|t| Reverse((Key(depth(t)), t)))
+        .collect();
     let mut hairs: Vec<u32> = Vec::new();
     while let Some(Reverse((_, t))) = heap.pop() {
         if c.tri(t)[0] == super::complex::DEAD {
@@ -248,8 +420,14 @@ fn burn(c: &mut Complex, cut: &Cut, distance: &[f64], wide: &[bool]) {
         }
         let v = c.tri(t);
         let mut sides = [edge(v[0], v[1]), edge(v[1], v[2]), edge(v[2], v[0])];
-        sides.sort_by(|x, y| c.length(y[0], y[1]).total_cmp(&c.length(x[0], x[1])).then(x.cmp(y)));
-        let Some(&free) = sides.iter().find(|e| c.face_count(e[0], e[1]) == 1) else { continue };
+        sides.sort_by(|x, y| {
+            c.length(y[0], y[1])
+                .total_cmp(&c.length(x[0], x[1]))
+                .then(x.cmp(y))
+        });
+        let Some(&free) = sides.iter().find(|e| c.face_count(e[0], e[1]) == 1) else {
+            continue;
+        };
         c.remove_triangle(t);
         for e in sides {
             let faces = c.on_edge(e[0], e[1]);
@@ -267,13 +445,16 @@ fn burn(c: &mut Complex, cut: &Cut, distance: &[f64], wide: &[bool]) {
 }
 
 fn remove_hair(c: &mut Complex, tip: u32, old_beams: usize, height: &[f64], next: &mut Vec<u32>) {
-    let [beam] = c.vertex_beams[tip as usize][..] else { return };
+    let [beam] = c.vertex_beams[tip as usize][..] else {
+        return;
+    };
     if !c.vertex_triangles[tip as usize].is_empty() || (beam as usize) < old_beams {
         return;
     }
     let [p, q] = c.beams[beam as usize];
     let root = if p == tip { q } else { p };
-    let alone = c.vertex_beams[root as usize].len() == 1 && c.vertex_triangles[root as usize].is_empty();
+    let alone =
+        c.vertex_beams[root as usize].len() == 1 && c.vertex_triangles[root as usize].is_empty();
     let rise = height[root as usize] - height[tip as usize];
     if !alone && rise > HAIR * c.length(tip, root) {
         c.remove_beam(beam);
@@ -284,7 +465,6 @@ fn remove_hair(c: &mut Complex, tip: u32, old_beams: usize, height: &[f64], next
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Vec3;
 
     /// A grid of `nx` by `ny` unit cells, two triangles each; `keep` chooses the cells.
     fn sheet(nx: u32, ny: u32, keep: impl Fn(u32, u32) -> bool) -> Complex {
@@ -309,22 +489,42 @@ mod tests {
 
     #[test]
     fn ribbon_becomes_a_curve_and_plate_stays() {
-        let mut ribbon = sheet(40, 3, |_, _| true);
+        let mut ribbon = sheet(40, 2, |_, _| true);
         let before = ribbon.betti();
-        burn_members(&mut ribbon, 1.0, &SkeletonOptions::default(), &Monitor::default()).expect("not cancelled");
+        burn_members(
+            &mut ribbon,
+            1.0,
+            &SkeletonOptions::default(),
+            &Monitor::default(),
+        )
+        .expect("not cancelled");
         assert_eq!(ribbon.betti(), before);
         assert_eq!(ribbon.alive().count(), 0);
         assert!(ribbon.alive_beams().count() > 30);
         let mut plate = sheet(40, 20, |_, _| true);
-        burn_members(&mut plate, 1.0, &SkeletonOptions::default(), &Monitor::default()).expect("not cancelled");
+        burn_members(
+            &mut plate,
+            1.0,
+            &SkeletonOptions::default(),
+            &Monitor::default(),
+        )
+        .expect("not cancelled");
         assert!(plate.alive().count() > 1500);
     }
 
     #[test]
     fn narrow_ring_keeps_its_loop() {
-        let mut ring = sheet(20, 20, |x, y| !(3..17).contains(&x) || !(3..17).contains(&y));
+        let mut ring = sheet(20, 20, |x, y| {
+            !(2..18).contains(&x) || !(2..18).contains(&y)
+        });
         let before = ring.betti();
-        burn_members(&mut ring, 1.0, &SkeletonOptions::default(), &Monitor::default()).expect("not cancelled");
+        burn_members(
+            &mut ring,
+            1.0,
+            &SkeletonOptions::default(),
+            &Monitor::default(),
+        )
+        .expect("not cancelled");
         assert_eq!(ring.betti(), before);
         assert_eq!(ring.alive().count(), 0);
     }

@@ -13,6 +13,7 @@ mod pairing;
 mod polygons;
 mod reduce;
 mod reference;
+mod square;
 mod stats;
 mod tidy;
 mod walk;

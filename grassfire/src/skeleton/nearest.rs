@@ -17,16 +17,29 @@ impl PointGrid {
     /// About two points a cell along a surface; never more cells than four times the points.
     pub fn new(points: Vec<Vec3>) -> Self {
         let first = points.first().copied().unwrap_or_default();
-        let (low, high) = points.iter().fold((first, first), |(l, h), p| (l.inf(p), h.sup(p)));
+        let (low, high) = points
+            .iter()
+            .fold((first, first), |(l, h), p| (l.inf(p), h.sup(p)));
         let size = high - low;
         let limit = (4 * points.len()).max(8) as f64;
         let mut cell = (size.max() / (points.len().max(1) as f64).sqrt()).max(1e-9);
-        let count = |cell: f64| size.iter().map(|s| (s / cell).floor() + 1.0).product::<f64>();
+        let count = |cell: f64| {
+            size.iter()
+                .map(|s| (s / cell).floor() + 1.0)
+                .product::<f64>()
+        };
         while count(cell) > limit {
             cell *= 1.2;
         }
         let dims = [0, 1, 2].map(|k| (size[k] / cell).floor() as i64 + 1);
-        let mut grid = Self { points, low, cell, dims, start: Vec::new(), order: Vec::new() };
+        let mut grid = Self {
+            points,
+            low,
+            cell,
+            dims,
+            start: Vec::new(),
+            order: Vec::new(),
+        };
         let cells = (dims[0] * dims[1] * dims[2]) as usize;
         let mut keys: Vec<(u32, u32)> = (0..grid.points.len() as u32)
             .map(|i| (grid.index(grid.place(&grid.points[i as usize])) as u32, i))
@@ -50,7 +63,8 @@ impl PointGrid {
     }
 
     fn place(&self, p: &Vec3) -> [i64; 3] {
-        [0, 1, 2].map(|k| (((p[k] - self.low[k]) / self.cell).floor() as i64).clamp(0, self.dims[k] - 1))
+        [0, 1, 2]
+            .map(|k| (((p[k] - self.low[k]) / self.cell).floor() as i64).clamp(0, self.dims[k] - 1))
     }
 
     fn index(&self, c: [i64; 3]) -> usize {
@@ -138,14 +152,24 @@ mod tests {
     fn agrees_with_brute_force() {
         let mut state = 7u64;
         let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
             (state >> 33) as f64 / (1u64 << 31) as f64
         };
-        let points: Vec<Vec3> = (0..500).map(|_| Vec3::new(random() * 9.0, random() * 3.0, random() * 0.2)).collect();
+        let points: Vec<Vec3> = (0..500)
+            .map(|_| Vec3::new(random() * 9.0, random() * 3.0, random() * 0.2))
+            .collect();
         let grid = PointGrid::new(points.clone());
         for _ in 0..100 {
-            let p = Vec3::new(random() * 14.0 - 2.0, random() * 5.0 - 1.0, random() * 2.0 - 1.0);
-            let mut all: Vec<(f64, u32)> = (0..500).map(|i| ((points[i] - p).norm_squared(), i as u32)).collect();
+            let p = Vec3::new(
+                random() * 14.0 - 2.0,
+                random() * 5.0 - 1.0,
+                random() * 2.0 - 1.0,
+            );
+            let mut all: Vec<(f64, u32)> = (0..500)
+                .map(|i| ((points[i] - p).norm_squared(), i as u32))
+                .collect();
             all.retain(|x| x.1 % 3 != 0);
             all.sort_by(|a, b| a.0.total_cmp(&b.0));
             all.truncate(8);
@@ -155,7 +179,11 @@ mod tests {
 
     #[test]
     fn empty_and_coincident() {
-        assert!(PointGrid::new(Vec::new()).nearest(&Vec3::zeros(), |_| true).is_none());
+        assert!(
+            PointGrid::new(Vec::new())
+                .nearest(&Vec3::zeros(), |_| true)
+                .is_none()
+        );
         let grid = PointGrid::new(vec![Vec3::zeros(); 10]);
         assert_eq!(grid.nearest(&Vec3::new(5.0, 0.0, 0.0), |_| true), Some(0));
         assert_eq!(grid.k_nearest(&Vec3::zeros(), 3, |_| true).len(), 3);

@@ -12,7 +12,11 @@ const EXACT_LIMIT: usize = 2000;
 
 /// Splits what would break the pairing: one-edge seams (both ends inside sheets would give a body edge with four
 /// faces), then one rim or seam edge of every sheet with an odd number of triangles. False when a sheet stays odd.
-pub(crate) fn make_even(c: &mut Complex, reference: &Reference, target: impl Fn(&Complex, u32, u32) -> f64) -> bool {
+pub(crate) fn make_even(
+    c: &mut Complex,
+    reference: &Reference,
+    target: impl Fn(&Complex, u32, u32) -> f64,
+) -> bool {
     let split = |c: &mut Complex, [a, b]: [u32; 2]| {
         let m = c.split_middle(a, b);
         reference.project(c, m);
@@ -32,14 +36,18 @@ pub(crate) fn make_even(c: &mut Complex, reference: &Reference, target: impl Fn(
             odd[c.sheet[t as usize] as usize] ^= true;
         }
         let count = odd.iter().filter(|o| **o).count();
-        let Some(first) = odd.iter().position(|o| *o) else { return true };
+        let Some(first) = odd.iter().position(|o| *o) else {
+            return true;
+        };
         // Splitting a seam may only pass the odd sheet on; give up when that goes round.
         stalled = if count < previous { 0 } else { stalled + 1 };
         previous = previous.min(count);
         if stalled > 2 * sheets + 8 {
             return false;
         }
-        let Some(e) = edge_to_split(c, &table, first as u32, &odd, &target) else { return false };
+        let Some(e) = edge_to_split(c, &table, first as u32, &odd, &target) else {
+            return false;
+        };
         split(c, e);
     }
 }
@@ -57,7 +65,13 @@ fn edge_to_split(
             continue;
         }
         // A rim settles one sheet alone, a seam between odd sheets several at once.
-        let gain = if f.len() == 1 { 1000 } else { f.iter().filter(|&&t| odd[c.sheet[t as usize] as usize]).count() };
+        let gain = if f.len() == 1 {
+            1000
+        } else {
+            f.iter()
+                .filter(|&&t| odd[c.sheet[t as usize] as usize])
+                .count()
+        };
         let rank = (gain, c.length(e[0], e[1]) / target(c, e[0], e[1]));
         if best.as_ref().is_none_or(|b| rank > b.0) {
             best = Some((rank, e));
@@ -69,7 +83,11 @@ fn edge_to_split(
 /// Pairs triangles into quads inside each sheet; never across an edge that has not exactly two triangles.
 pub(crate) fn pair(c: &Complex, monitor: &Monitor) -> Result<Vec<Option<Polygon>>, Cancelled> {
     let table = c.edge_table();
-    let sheets = c.alive().map(|t| c.sheet[t as usize] + 1).max().unwrap_or(0) as usize;
+    let sheets = c
+        .alive()
+        .map(|t| c.sheet[t as usize] + 1)
+        .max()
+        .unwrap_or(0) as usize;
     let mut members: Vec<Vec<u32>> = vec![Vec::new(); sheets];
     for t in c.alive() {
         members[c.sheet[t as usize] as usize].push(t);
@@ -120,7 +138,10 @@ fn pair_sheet(
         out.push(Some(Polygon::quad(x.quad, sheet)));
     };
     if members.len() <= EXACT_LIMIT {
-        let edges = candidates.iter().map(|x| (local(x.s), local(x.t), x.weight)).collect();
+        let edges = candidates
+            .iter()
+            .map(|x| (local(x.s), local(x.t), x.weight))
+            .collect();
         let mate = mwmatching::Matching::new(edges).max_cardinality().solve();
         for x in &candidates {
             let (s, t) = (local(x.s), local(x.t));
@@ -157,9 +178,18 @@ pub(crate) fn split_rims(
         let v = p.corners();
         (0..3).find(|&k| table.at(v[k], v[(k + 1) % 3]).len() == 1)
     };
-    let sheets = polygons.iter().flatten().map(|p| p.sheet + 1).max().unwrap_or(0) as usize;
+    let sheets = polygons
+        .iter()
+        .flatten()
+        .map(|p| p.sheet + 1)
+        .max()
+        .unwrap_or(0) as usize;
     let mut inner = vec![0usize; sheets];
-    for p in polygons.iter().flatten().filter(|p| p.is_triangle() && rim_edge(p).is_none()) {
+    for p in polygons
+        .iter()
+        .flatten()
+        .filter(|p| p.is_triangle() && rim_edge(p).is_none())
+    {
         inner[p.sheet as usize] += 1;
     }
     let mut settled = 0;
@@ -178,7 +208,9 @@ pub(crate) fn split_rims(
         let (a, b, apex) = (v[k], v[(k + 1) % 3], v[(k + 2) % 3]);
         let middle = (points[a as usize] + points[b as usize]) / 2.0;
         let radius = (radii[a as usize] + radii[b as usize]) / 2.0;
-        let (x, r) = reference.on_arc(&middle, Class::Rim).unwrap_or((middle, radius));
+        let (x, r) = reference
+            .on_arc(&middle, Class::Rim)
+            .unwrap_or((middle, radius));
         let far = (points[a as usize] - points[b as usize]).norm();
         let m = points.len() as u32;
         // The nearest fine rim may be another one: then the straight middle serves better.
@@ -218,7 +250,12 @@ pub(crate) fn split_all(
         let (v, n) = (p.corners(), p.corners().len());
         let centre = add(v);
         for k in 0..n {
-            let quad = [v[k], middle(v[k], v[(k + 1) % n]), centre, middle(v[(k + n - 1) % n], v[k])];
+            let quad = [
+                v[k],
+                middle(v[k], v[(k + 1) % n]),
+                centre,
+                middle(v[(k + n - 1) % n], v[k]),
+            ];
             out.push(Some(Polygon::quad(quad, p.sheet)));
         }
     }

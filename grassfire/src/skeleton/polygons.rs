@@ -13,7 +13,11 @@ pub(crate) struct Polygon {
 
 impl Polygon {
     pub fn triangle(v: [u32; 3], sheet: u32) -> Self {
-        Self { v: [v[0], v[1], v[2], v[2]], n: 3, sheet }
+        Self {
+            v: [v[0], v[1], v[2], v[2]],
+            n: 3,
+            sheet,
+        }
     }
 
     pub fn quad(v: [u32; 4], sheet: u32) -> Self {
@@ -43,7 +47,10 @@ impl AsRef<[u32]> for Polygon {
 /// Edge table of polygons that are present.
 pub(crate) fn edge_table(polygons: &[Option<Polygon>]) -> EdgeTable {
     EdgeTable::new(
-        polygons.iter().enumerate().filter_map(|(i, p)| p.as_ref().map(|p| (i as u32, p.corners()))),
+        polygons
+            .iter()
+            .enumerate()
+            .filter_map(|(i, p)| p.as_ref().map(|p| (i as u32, p.corners()))),
     )
 }
 
@@ -62,5 +69,9 @@ pub(crate) fn quad_quality(points: &[Vec3], q: &[u32; 4]) -> f64 {
 /// Angle between two vectors, degrees; 0 when one of them vanishes.
 pub(crate) fn angle(a: &Vec3, b: &Vec3) -> f64 {
     let l = a.norm() * b.norm();
-    if l > 0.0 { (a.dot(b) / l).clamp(-1.0, 1.0).acos().to_degrees() } else { 0.0 }
+    if l > 0.0 {
+        (a.dot(b) / l).clamp(-1.0, 1.0).acos().to_degrees()
+    } else {
+        0.0
+    }
 }

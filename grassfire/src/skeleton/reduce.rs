@@ -14,12 +14,17 @@ pub(crate) fn collapse_short(
 ) -> Result<(), Cancelled> {
     for _ in 0..rounds {
         monitor.check()?;
-        let mut edges: Vec<(f64, [u32; 2])> =
-            c.edges().into_iter().map(|e| (c.length(e[0], e[1]), e)).filter(|x| x.0 <= length).collect();
+        let mut edges: Vec<(f64, [u32; 2])> = c
+            .edges()
+            .into_iter()
+            .map(|e| (c.length(e[0], e[1]), e))
+            .filter(|x| x.0 <= length)
+            .collect();
         edges.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut collapsed = 0;
         for (l, [a, b]) in edges {
-            if c.used(a) && c.used(b) && c.connected(a, b) && try_collapse(c, a, b, l, length, unit) {
+            if c.used(a) && c.used(b) && c.connected(a, b) && try_collapse(c, a, b, l, length, unit)
+            {
                 collapsed += 1;
             }
         }
@@ -50,7 +55,8 @@ fn try_collapse(c: &mut Complex, a: u32, b: u32, l: f64, length: f64, unit: f64)
     if l > 0.3 * length && !allowed {
         return false;
     }
-    let fits = l < 0.05 * unit || !c.would_flip(a, b, &c.points[b as usize], 0.3, 1e-2 * unit * unit);
+    let fits =
+        l < 0.05 * unit || !c.would_flip(a, b, &c.points[b as usize], 0.3, 1e-2 * unit * unit);
     if fits && c.link_condition(a, b) {
         c.collapse(a, b);
         return true;
@@ -81,7 +87,11 @@ pub(crate) fn prune_spurs(c: &mut Complex, absolute: f64, relative: f64) -> usiz
         if spurs.is_empty() {
             return removed;
         }
-        spurs.sort_by(|a, b| a.protrusion.total_cmp(&b.protrusion).then(a.path.cmp(&b.path)));
+        spurs.sort_by(|a, b| {
+            a.protrusion
+                .total_cmp(&b.protrusion)
+                .then(a.path.cmp(&b.path))
+        });
         let mut roots = vec![false; c.points.len()];
         for spur in spurs {
             // One spur a root and round: the rest may have become a plain chain.
@@ -119,13 +129,20 @@ fn spur_from(c: &Complex, tip: u32) -> Option<Spur> {
             break;
         }
         let beams = &c.vertex_beams[next as usize];
-        last_beam = if beams[0] == last_beam { beams[1] } else { beams[0] };
+        last_beam = if beams[0] == last_beam {
+            beams[1]
+        } else {
+            beams[0]
+        };
     }
     let root = path[path.len() - 1];
     if is_tip(c, root) {
         return None;
     }
-    Some(Spur { protrusion: length + c.radii[tip as usize] - c.radii[root as usize], path })
+    Some(Spur {
+        protrusion: length + c.radii[tip as usize] - c.radii[root as usize],
+        path,
+    })
 }
 
 #[cfg(test)]
@@ -148,8 +165,12 @@ mod tests {
     #[test]
     fn short_edges_go_and_topology_stays() {
         let n = 40;
-        let points = (0..n).map(|i| Vec3::new((i / 2) as f64 * 0.2, (i % 2) as f64 * 0.2, 0.0)).collect();
-        let triangles: Vec<[u32; 3]> = (0..n - 2).map(|i| [i as u32, i as u32 + 1, i as u32 + 2]).collect();
+        let points = (0..n)
+            .map(|i| Vec3::new((i / 2) as f64 * 0.2, (i % 2) as f64 * 0.2, 0.0))
+            .collect();
+        let triangles: Vec<[u32; 3]> = (0..n - 2)
+            .map(|i| [i as u32, i as u32 + 1, i as u32 + 2])
+            .collect();
         let mut c = Complex::new(points, vec![1.0; n], &triangles, &[]);
         let before = c.betti();
         collapse_short(&mut c, 1.0, 1.0, 5, &Monitor::default()).expect("not cancelled");

@@ -42,21 +42,35 @@ impl Reference {
                 }
             }
         }
-        let sheet = Samples { grid: PointGrid::new(points), radii, sheets };
+        let sheet = Samples {
+            grid: PointGrid::new(points),
+            radii,
+            sheets,
+        };
         let arc = |kind| sample_arcs(c, arcs, kind, step);
-        Self { sheet, arcs: [arc(ArcKind::Rim), arc(ArcKind::Seam), arc(ArcKind::Beam)] }
+        Self {
+            sheet,
+            arcs: [arc(ArcKind::Rim), arc(ArcKind::Seam), arc(ArcKind::Beam)],
+        }
     }
 
     /// Puts an interior point onto the sheets for which `on_sheet` holds; returns position and radius.
     pub fn on_sheet(&self, x: &Vec3, on_sheet: impl Fn(u32) -> bool) -> Option<(Vec3, f64)> {
-        let near = self.sheet.grid.k_nearest(x, PLANE_POINTS, |i| on_sheet(self.sheet.sheets[i as usize]));
+        let near = self
+            .sheet
+            .grid
+            .k_nearest(x, PLANE_POINTS, |i| on_sheet(self.sheet.sheets[i as usize]));
         if near.len() < 3 {
             return None;
         }
         let n = near.len() as f64;
         let at = |i: u32| self.sheet.grid.points()[i as usize];
         let mean = near.iter().map(|&(_, i)| at(i)).sum::<Vec3>() / n;
-        let radius = near.iter().map(|&(_, i)| self.sheet.radii[i as usize]).sum::<f64>() / n;
+        let radius = near
+            .iter()
+            .map(|&(_, i)| self.sheet.radii[i as usize])
+            .sum::<f64>()
+            / n;
         let mut spread = nalgebra::Matrix3::zeros();
         for &(_, i) in &near {
             let d = at(i) - mean;
@@ -84,8 +98,10 @@ impl Reference {
         let x = c.points[v as usize];
         let class = c.class(v);
         let found = if class == Class::Interior {
-            let mut tags: Vec<u32> =
-                c.vertex_triangles[v as usize].iter().map(|&t| c.sheet[t as usize]).collect();
+            let mut tags: Vec<u32> = c.vertex_triangles[v as usize]
+                .iter()
+                .map(|&t| c.sheet[t as usize])
+                .collect();
             tags.sort_unstable();
             self.on_sheet(&x, |s| tags.binary_search(&s).is_ok())
         } else {
@@ -111,5 +127,9 @@ fn sample_arcs(c: &Complex, arcs: &Arcs, kind: ArcKind, step: f64) -> Samples {
             }
         }
     }
-    Samples { grid: PointGrid::new(points), radii, sheets: Vec::new() }
+    Samples {
+        grid: PointGrid::new(points),
+        radii,
+        sheets: Vec::new(),
+    }
 }

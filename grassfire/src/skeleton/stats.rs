@@ -59,10 +59,27 @@ pub fn topology(skeleton: &Skeleton) -> Betti {
 
 /// Figures of any skeleton that passes [`super::check`].
 pub fn stats(skeleton: &Skeleton) -> SkeletonStats {
-    let table = EdgeTable::new(skeleton.quads.iter().enumerate().map(|(i, q)| (i as u32, &q[..])));
-    let mut radii: Vec<f64> = skeleton.radii.iter().copied().filter(|r| r.is_finite()).collect();
+    let table = EdgeTable::new(
+        skeleton
+            .quads
+            .iter()
+            .enumerate()
+            .map(|(i, q)| (i as u32, &q[..])),
+    );
+    let mut radii: Vec<f64> = skeleton
+        .radii
+        .iter()
+        .copied()
+        .filter(|r| r.is_finite())
+        .collect();
     radii.sort_by(f64::total_cmp);
-    let at = |share: f64| radii.get((share * radii.len() as f64) as usize).or(radii.last()).copied().unwrap_or(0.0);
+    let at = |share: f64| {
+        radii
+            .get((share * radii.len() as f64) as usize)
+            .or(radii.last())
+            .copied()
+            .unwrap_or(0.0)
+    };
     SkeletonStats {
         quads: skeleton.quads.len(),
         beams: skeleton.beams.len(),
@@ -72,7 +89,11 @@ pub fn stats(skeleton: &Skeleton) -> SkeletonStats {
         spheres: skeleton.points.len(),
         regular_fraction: regular_fraction(skeleton, &table),
         corner_deviation: corner_deviation(skeleton),
-        radius: Range { min: at(0.0), median: at(0.5), max: at(1.0) },
+        radius: Range {
+            min: at(0.0),
+            median: at(0.5),
+            max: at(1.0),
+        },
     }
 }
 
@@ -89,11 +110,20 @@ fn sheets(table: &EdgeTable, quads: usize) -> usize {
 /// Chains of edges whose face count passes `wanted`; a chain ends where more than two arc edges or beams meet.
 fn polylines(skeleton: &Skeleton, table: &EdgeTable, wanted: impl Fn(usize) -> bool) -> usize {
     let mut meeting = vec![0u32; skeleton.points.len()];
-    for e in table.iter().filter(|(_, f)| f.len() != 2).map(|(e, _)| e).chain(skeleton.beams.iter().copied()) {
+    for e in table
+        .iter()
+        .filter(|(_, f)| f.len() != 2)
+        .map(|(e, _)| e)
+        .chain(skeleton.beams.iter().copied())
+    {
         meeting[e[0] as usize] += 1;
         meeting[e[1] as usize] += 1;
     }
-    let edges: Vec<[u32; 2]> = table.iter().filter(|(_, f)| wanted(f.len())).map(|(e, _)| e).collect();
+    let edges: Vec<[u32; 2]> = table
+        .iter()
+        .filter(|(_, f)| wanted(f.len()))
+        .map(|(e, _)| e)
+        .collect();
     let mut sets = UnionFind::new(edges.len());
     let mut last = vec![u32::MAX; skeleton.points.len()];
     for (i, e) in edges.iter().enumerate() {
@@ -106,7 +136,9 @@ fn polylines(skeleton: &Skeleton, table: &EdgeTable, wanted: impl Fn(usize) -> b
             }
         }
     }
-    (0..edges.len() as u32).filter(|&i| sets.find(i) == i).count()
+    (0..edges.len() as u32)
+        .filter(|&i| sets.find(i) == i)
+        .count()
 }
 
 fn regular_fraction(skeleton: &Skeleton, table: &EdgeTable) -> f64 {
@@ -115,7 +147,12 @@ fn regular_fraction(skeleton: &Skeleton, table: &EdgeTable) -> f64 {
     for &v in skeleton.quads.iter().flatten() {
         valence[v as usize] += 1;
     }
-    for e in table.iter().filter(|(_, f)| f.len() != 2).map(|(e, _)| e).chain(skeleton.beams.iter().copied()) {
+    for e in table
+        .iter()
+        .filter(|(_, f)| f.len() != 2)
+        .map(|(e, _)| e)
+        .chain(skeleton.beams.iter().copied())
+    {
         inner[e[0] as usize] = false;
         inner[e[1] as usize] = false;
     }
@@ -124,14 +161,21 @@ fn regular_fraction(skeleton: &Skeleton, table: &EdgeTable) -> f64 {
         count += 1;
         regular += usize::from(valence[v] == 4);
     }
-    if count == 0 { 1.0 } else { regular as f64 / count as f64 }
+    if count == 0 {
+        1.0
+    } else {
+        regular as f64 / count as f64
+    }
 }
 
 fn corner_deviation(skeleton: &Skeleton) -> Deviation {
     let mut all: Vec<f64> = Vec::with_capacity(4 * skeleton.quads.len());
     for q in &skeleton.quads {
         let p = q.map(|v| skeleton.points[v as usize]);
-        all.extend((0..4).map(|k| (angle(&(p[(k + 3) % 4] - p[k]), &(p[(k + 1) % 4] - p[k])) - 90.0).abs()));
+        all.extend(
+            (0..4)
+                .map(|k| (angle(&(p[(k + 3) % 4] - p[k]), &(p[(k + 1) % 4] - p[k])) - 90.0).abs()),
+        );
     }
     if all.is_empty() {
         return Deviation::default();

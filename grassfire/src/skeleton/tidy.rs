@@ -17,7 +17,7 @@ pub(crate) struct Tidy<'a> {
     pub points: &'a mut Vec<Vec3>,
     pub radii: &'a mut Vec<f64>,
     pub quads: Vec<Option<Polygon>>,
-    pub beams: &'a [[u32; 2]],
+    pub beams: Vec<[u32; 2]>,
     pub reference: &'a Reference,
 }
 
@@ -27,33 +27,54 @@ struct Tables {
 }
 
 enum Operation {
-    Doublet { keep: u32, drop: u32, vertex: u32, opposite: u32 },
-    Collapse { quad: u32, from: u32, into: u32 },
-    Rotate { first: u32, second: u32, quads: [[u32; 4]; 2] },
+    Doublet {
+        keep: u32,
+        drop: u32,
+        vertex: u32,
+        opposite: u32,
+    },
+    Collapse {
+        quad: u32,
+        from: u32,
+        into: u32,
+    },
+    Rotate {
+        first: u32,
+        second: u32,
+        quads: [[u32; 4]; 2],
+    },
 }
 
 impl Tidy<'_> {
     /// Runs the clean-up; returns the number of operations.
     pub fn run(&mut self, monitor: &Monitor) -> Result<usize, Cancelled> {
         let tables = self.tables();
-        let fixed = self.fixed(&tables);
+        let mut fixed = self.fixed(&tables);
         let ideal = self.ideal(&tables, &fixed);
         self.relax(&fixed, 3);
         let mut total = 0;
         for _ in 0..MAX_BATCHES {
             monitor.check()?;
-            let saved = (self.quads.clone(), self.points.clone(), self.radii.clone());
+            let saved = (
+                self.quads.clone(),
+                self.beams.clone(),
+                self.points.clone(),
+                self.radii.clone(),
+            );
             let topology = self.betti();
             let mut done = 0;
             while done < BATCH {
                 let tables = self.tables();
-                let Some(operation) = self.best(&tables, &fixed, &ideal) else { break };
+                let Some(operation) = self.best(&tables, &fixed, &ideal) else {
+                    break;
+                };
                 self.apply(operation, &tables);
+                fixed = self.fixed(&self.tables());
                 self.relax(&fixed, 2);
                 done += 1;
             }
             if self.betti() != topology {
-                (self.quads, *self.points, *self.radii) = saved;
+                (self.quads, self.beams, *self.points, *self.radii) = saved;
                 break;
             }
             total += done;
@@ -67,7 +88,7 @@ impl Tidy<'_> {
 
     fn betti(&self) -> crate::topology::Betti {
         let list: Vec<Polygon> = self.quads.iter().flatten().copied().collect();
-        betti(self.points.len(), &list, self.beams)
+        betti(self.points.len(), &list, &self.beams)
     }
 
     fn tables(&self) -> Tables {
@@ -77,7 +98,10 @@ impl Tidy<'_> {
                 around[v as usize].push(i as u32);
             }
         }
-        Tables { edges: edge_table(&self.quads), around }
+        Tables {
+            edges: edge_table(&self.quads),
+            around,
+        }
     }
 
     /// Vertices on rims, seams and beams: they stay.
@@ -87,7 +111,7 @@ impl Tidy<'_> {
             fixed[e[0] as usize] = true;
             fixed[e[1] as usize] = true;
         }
-        for b in self.beams {
+        for b in &self.beams {
             fixed[b[0] as usize] = true;
             fixed[b[1] as usize] = true;
         }
@@ -97,13 +121,17 @@ impl Tidy<'_> {
     fn ideal(&self, tables: &Tables, fixed: &[bool]) -> Vec<i64> {
         (0..self.points.len())
             .map(|v| {
-                let mut sheets: Vec<u32> = tables.around[v].iter().map(|&i| self.sheet(i)).collect();
+                let mut sheets: Vec<u32> =
+                    tables.around[v].iter().map(|&i| self.sheet(i)).collect();
                 sheets.sort_unstable();
                 sheets.dedup();
                 if !fixed[v] || sheets.is_empty() {
                     return 4;
                 }
-                let opening: f64 = tables.around[v].iter().map(|&i| self.corner_angle(i, v as u32)).sum();
+                let opening: f64 = tables.around[v]
+                    .iter()
+                    .map(|&i| self.corner_angle(i, v as u32))
+                    .sum();
                 ((opening / sheets.len() as f64 / 90.0).round() as i64).max(1)
             })
             .collect()
@@ -114,8 +142,12 @@ impl Tidy<'_> {
     }
 
     fn corner_angle(&self, quad: u32, v: u32) -> f64 {
-        let Some(q) = self.quads[quad as usize].and_then(|q| q.as_quad()) else { return 0.0 };
-        let Some(k) = q.iter().position(|&w| w == v) else { return 0.0 };
+        let Some(q) = self.quads[quad as usize].and_then(|q| q.as_quad()) else {
+            return 0.0;
+        };
+        let Some(k) = q.iter().position(|&w| w == v) else {
+            return 0.0;
+        };
         let x = |w: u32| self.points[w as usize];
         angle(&(x(q[(k + 3) % 4]) - x(v)), &(x(q[(k + 1) % 4]) - x(v)))
     }
@@ -133,8 +165,11 @@ impl Tidy<'_> {
                 if fixed[v] || around[v].is_empty() {
                     continue;
                 }
-                let mean =
-                    around[v].iter().map(|&w| self.points[w as usize]).sum::<Vec3>() / around[v].len() as f64;
+                let mean = around[v]
+                    .iter()
+                    .map(|&w| self.points[w as usize])
+                    .sum::<Vec3>()
+                    / around[v].len() as f64;
                 let x = self.points[v] * 0.4 + mean * 0.6;
                 if let Some((x, r)) = self.reference.on_sheet(&x, |_| true) {
                     self.points[v] = x;
@@ -164,7 +199,9 @@ impl Tidy<'_> {
         for (e, f) in tables.edges.iter() {
             if let [i, j] = *f {
                 for turn in 0..2 {
-                    if let Some((gain, operation)) = self.rotate(e, i, j, turn, tables, fixed, ideal) {
+                    if let Some((gain, operation)) =
+                        self.rotate(e, i, j, turn, tables, fixed, ideal)
+                    {
                         offer(gain, operation);
                     }
                 }
@@ -175,27 +212,74 @@ impl Tidy<'_> {
 
     /// Quads of `v` in `sheet`.
     fn valence(&self, tables: &Tables, v: u32, sheet: u32) -> i64 {
-        tables.around[v as usize].iter().filter(|&&i| self.sheet(i) == sheet).count() as i64
+        tables.around[v as usize]
+            .iter()
+            .filter(|&&i| self.sheet(i) == sheet)
+            .count() as i64
     }
 
     fn doublet(&self, tables: &Tables, fixed: &[bool]) -> Option<Operation> {
         for v in 0..self.points.len() as u32 {
-            let [i, j] = tables.around[v as usize][..] else { continue };
-            if fixed[v as usize] {
+            let [i, j] = tables.around[v as usize][..] else {
+                continue;
+            };
+            if fixed[v as usize] && !self.only_foot(tables, v) {
                 continue;
             }
             let a = self.quads[i as usize]?.as_quad()?;
             let b = self.quads[j as usize]?.as_quad()?;
             let l = b.iter().position(|&w| w == v)?;
             let opposite = b[(l + 2) % 4];
-            if !a.contains(&opposite) {
-                return Some(Operation::Doublet { keep: i, drop: j, vertex: v, opposite });
+            if !a.contains(&opposite) && !self.beams_to(v).any(|w| self.linked(tables, w, opposite))
+            {
+                return Some(Operation::Doublet {
+                    keep: i,
+                    drop: j,
+                    vertex: v,
+                    opposite,
+                });
             }
         }
         None
     }
 
-    fn collapse(&self, i: u32, k: usize, tables: &Tables, fixed: &[bool], ideal: &[i64]) -> Option<(i64, Operation)> {
+    /// A beam foot inside a sheet: nothing but the beam holds it, so it may slide to a neighbouring vertex.
+    fn only_foot(&self, tables: &Tables, v: u32) -> bool {
+        let Some(q) = tables.around[v as usize]
+            .first()
+            .and_then(|&i| self.quads[i as usize])
+        else {
+            return false;
+        };
+        tables.around[v as usize].len() == 2
+            && q.corners()
+                .iter()
+                .filter(|&&w| tables.edges.at(v, w).len() == 2)
+                .count()
+                == 2
+    }
+
+    fn beams_to(&self, v: u32) -> impl Iterator<Item = u32> {
+        self.beams
+            .iter()
+            .filter(move |b| b.contains(&v))
+            .map(move |b| if b[0] == v { b[1] } else { b[0] })
+    }
+
+    fn linked(&self, tables: &Tables, a: u32, b: u32) -> bool {
+        a == b
+            || !tables.edges.at(a, b).is_empty()
+            || self.beams.iter().any(|x| x.contains(&a) && x.contains(&b))
+    }
+
+    fn collapse(
+        &self,
+        i: u32,
+        k: usize,
+        tables: &Tables,
+        fixed: &[bool],
+        ideal: &[i64],
+    ) -> Option<(i64, Operation)> {
         let q = self.quads[i as usize]?.as_quad()?;
         let (mut u, mut w, x, y) = (q[k], q[k + 2], q[k + 1], q[(k + 3) % 4]);
         if fixed[u as usize] {
@@ -218,7 +302,9 @@ impl Tidy<'_> {
         for &r in &tables.around[u as usize] {
             let p = self.quads[r as usize]?;
             let folds = |&v: &u32| {
-                !q.contains(&v) && !tables.edges.at(u, v).is_empty() && !tables.edges.at(w, v).is_empty()
+                !q.contains(&v)
+                    && !tables.edges.at(u, v).is_empty()
+                    && !tables.edges.at(w, v).is_empty()
             };
             if p.corners().iter().any(folds) {
                 return None;
@@ -230,7 +316,14 @@ impl Tidy<'_> {
             - cost(w, n(w))
             - cost(x, n(x))
             - cost(y, n(y));
-        Some((gain, Operation::Collapse { quad: i, from: u, into: w }))
+        Some((
+            gain,
+            Operation::Collapse {
+                quad: i,
+                from: u,
+                into: w,
+            },
+        ))
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -277,26 +370,52 @@ impl Tidy<'_> {
         };
         let gain = change(p, -1) + change(q, -1) + change(g, 1) + change(h, 1);
         let good = quads.iter().all(|q| quad_quality(self.points, q) > 0.15);
-        (gain < 0 && good).then_some((gain, Operation::Rotate { first: i, second: j, quads }))
+        (gain < 0 && good).then_some((
+            gain,
+            Operation::Rotate {
+                first: i,
+                second: j,
+                quads,
+            },
+        ))
     }
 
     fn apply(&mut self, operation: Operation, tables: &Tables) {
         let renamed = |q: &Polygon, from: u32, to: u32| {
-            q.as_quad().map(|v| Polygon::quad(v.map(|w| if w == from { to } else { w }), q.sheet))
+            q.as_quad()
+                .map(|v| Polygon::quad(v.map(|w| if w == from { to } else { w }), q.sheet))
         };
         match operation {
-            Operation::Doublet { keep, drop, vertex, opposite } => {
+            Operation::Doublet {
+                keep,
+                drop,
+                vertex,
+                opposite,
+            } => {
                 self.quads[keep as usize] =
                     self.quads[keep as usize].and_then(|q| renamed(&q, vertex, opposite));
                 self.quads[drop as usize] = None;
+                for end in self
+                    .beams
+                    .iter_mut()
+                    .flatten()
+                    .filter(|end| **end == vertex)
+                {
+                    *end = opposite;
+                }
             }
             Operation::Collapse { quad, from, into } => {
                 self.quads[quad as usize] = None;
                 for &i in &tables.around[from as usize] {
-                    self.quads[i as usize] = self.quads[i as usize].and_then(|q| renamed(&q, from, into));
+                    self.quads[i as usize] =
+                        self.quads[i as usize].and_then(|q| renamed(&q, from, into));
                 }
             }
-            Operation::Rotate { first, second, quads } => {
+            Operation::Rotate {
+                first,
+                second,
+                quads,
+            } => {
                 let sheet = self.sheet(first);
                 self.quads[first as usize] = Some(Polygon::quad(quads[0], sheet));
                 self.quads[second as usize] = Some(Polygon::quad(quads[1], sheet));

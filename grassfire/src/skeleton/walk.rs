@@ -20,7 +20,12 @@ pub(crate) fn walk_triangles(
     points: &[Vec3],
     monitor: &Monitor,
 ) -> Result<usize, Cancelled> {
-    let mut sheets: Vec<u32> = polygons.iter().flatten().filter(|p| p.is_triangle()).map(|p| p.sheet).collect();
+    let mut sheets: Vec<u32> = polygons
+        .iter()
+        .flatten()
+        .filter(|p| p.is_triangle())
+        .map(|p| p.sheet)
+        .collect();
     sheets.sort_unstable();
     sheets.dedup();
     for sheet in sheets {
@@ -29,7 +34,9 @@ pub(crate) fn walk_triangles(
         loop {
             monitor.check()?;
             let table = edge_table(polygons);
-            let Some(path) = shortest_path(polygons, &table, sheet) else { break };
+            let Some(path) = shortest_path(polygons, &table, sheet) else {
+                break;
+            };
             let triangles = count_triangles(polygons, sheet);
             let done = follow(polygons, &path, points);
             pairs += 1;
@@ -37,14 +44,24 @@ pub(crate) fn walk_triangles(
                 break;
             }
         }
-        if pairs > 0 && signature(points.len(), polygons, beams) != signature(points.len(), &before, beams) {
+        if pairs > 0
+            && signature(points.len(), polygons, beams) != signature(points.len(), &before, beams)
+        {
             *polygons = before;
         }
     }
-    Ok(polygons.iter().flatten().filter(|p| p.is_triangle()).count())
+    Ok(polygons
+        .iter()
+        .flatten()
+        .filter(|p| p.is_triangle())
+        .count())
 }
 
-fn signature(n: usize, polygons: &[Option<Polygon>], beams: &[[u32; 2]]) -> (crate::topology::Betti, bool) {
+fn signature(
+    n: usize,
+    polygons: &[Option<Polygon>],
+    beams: &[[u32; 2]],
+) -> (crate::topology::Betti, bool) {
     let list: Vec<Polygon> = polygons.iter().flatten().copied().collect();
     let distinct = list.iter().all(|p| {
         let mut v = p.corners().to_vec();
@@ -55,13 +72,21 @@ fn signature(n: usize, polygons: &[Option<Polygon>], beams: &[[u32; 2]]) -> (cra
 }
 
 fn count_triangles(polygons: &[Option<Polygon>], sheet: u32) -> usize {
-    polygons.iter().flatten().filter(|p| p.sheet == sheet && p.is_triangle()).count()
+    polygons
+        .iter()
+        .flatten()
+        .filter(|p| p.sheet == sheet && p.is_triangle())
+        .count()
 }
 
 /// Shortest dual path between two triangles of the sheet.
 fn shortest_path(polygons: &[Option<Polygon>], table: &EdgeTable, sheet: u32) -> Option<Vec<u32>> {
-    let triangle = |i: u32| polygons[i as usize].is_some_and(|p| p.sheet == sheet && p.is_triangle());
-    let starts: Vec<u32> = (0..polygons.len() as u32).filter(|&i| triangle(i)).take(STARTS).collect();
+    let triangle =
+        |i: u32| polygons[i as usize].is_some_and(|p| p.sheet == sheet && p.is_triangle());
+    let starts: Vec<u32> = (0..polygons.len() as u32)
+        .filter(|&i| triangle(i))
+        .take(STARTS)
+        .collect();
     let mut best: Option<Vec<u32>> = None;
     for start in starts {
         let limit = best.as_ref().map_or(usize::MAX, Vec::len);
@@ -116,7 +141,9 @@ fn search(
 fn follow(polygons: &mut [Option<Polygon>], path: &[u32], points: &[Vec3]) -> bool {
     let mut current = path[0];
     for (step, &next) in path.iter().enumerate().skip(1) {
-        let (Some(t), Some(p)) = (polygons[current as usize], polygons[next as usize]) else { return false };
+        let (Some(t), Some(p)) = (polygons[current as usize], polygons[next as usize]) else {
+            return false;
+        };
         if !t.is_triangle() {
             return false;
         }
@@ -130,7 +157,9 @@ fn follow(polygons: &mut [Option<Polygon>], path: &[u32], points: &[Vec3]) -> bo
         let (a, b, c) = (v[k], v[(k + 1) % 3], v[(k + 2) % 3]);
         let Some(quad) = p.as_quad() else {
             // Two triangles meet.
-            let Some(&o) = p.corners().iter().find(|&&w| w != a && w != b) else { return false };
+            let Some(&o) = p.corners().iter().find(|&&w| w != a && w != b) else {
+                return false;
+            };
             if o == c {
                 return false;
             }
@@ -141,7 +170,9 @@ fn follow(polygons: &mut [Option<Polygon>], path: &[u32], points: &[Vec3]) -> bo
         if quad.contains(&c) {
             // The quad wraps round the triangle (two shared edges): both become one triangle.
             let wrapped = (0..4).find(|&m| {
-                [quad[m], quad[(m + 1) % 4], quad[(m + 3) % 4]].iter().all(|w| t.corners().contains(w))
+                [quad[m], quad[(m + 1) % 4], quad[(m + 3) % 4]]
+                    .iter()
+                    .all(|w| t.corners().contains(w))
             });
             let Some(m) = wrapped else { return false };
             let rest = [quad[(m + 1) % 4], quad[(m + 2) % 4], quad[(m + 3) % 4]];
@@ -150,8 +181,12 @@ fn follow(polygons: &mut [Option<Polygon>], path: &[u32], points: &[Vec3]) -> bo
             current = next;
             continue;
         }
-        let Some(target) = path.get(step + 1).and_then(|&i| polygons[i as usize]) else { return false };
-        let Some((triangle, left)) = shift([a, b, c], quad, &target, points) else { return false };
+        let Some(target) = path.get(step + 1).and_then(|&i| polygons[i as usize]) else {
+            return false;
+        };
+        let Some((triangle, left)) = shift([a, b, c], quad, &target, points) else {
+            return false;
+        };
         polygons[current as usize] = Some(Polygon::quad(left, t.sheet));
         polygons[next as usize] = Some(Polygon::triangle(triangle, t.sheet));
         current = next;
@@ -161,7 +196,12 @@ fn follow(polygons: &mut [Option<Polygon>], path: &[u32], points: &[Vec3]) -> bo
 
 /// Triangle `abc` enters `quad` over `ab`: the five corners become a quad behind and a triangle that shares an edge with
 /// `target`. Sheets need no orientation: the quad is turned to run b -> a here.
-fn shift([a, b, c]: [u32; 3], mut quad: [u32; 4], target: &Polygon, points: &[Vec3]) -> Option<([u32; 3], [u32; 4])> {
+fn shift(
+    [a, b, c]: [u32; 3],
+    mut quad: [u32; 4],
+    target: &Polygon,
+    points: &[Vec3],
+) -> Option<([u32; 3], [u32; 4])> {
     let mut m = quad.iter().position(|&w| w == a)?;
     if quad[(m + 1) % 4] == b {
         quad.reverse();
@@ -178,7 +218,8 @@ fn shift([a, b, c]: [u32; 3], mut quad: [u32; 4], target: &Polygon, points: &[Ve
     ];
     let corners = target.corners();
     let n = corners.len();
-    let side = |s: [u32; 2]| (0..n).any(|k| edge(corners[k], corners[(k + 1) % n]) == edge(s[0], s[1]));
+    let side =
+        |s: [u32; 2]| (0..n).any(|k| edge(corners[k], corners[(k + 1) % n]) == edge(s[0], s[1]));
     options
         .into_iter()
         .filter(|o| side(o.2))
@@ -202,7 +243,8 @@ mod tests {
             .collect();
         polygons.push(Some(Polygon::triangle([12, 0, 1], 0)));
         polygons.push(Some(Polygon::triangle([10, 13, 11], 0)));
-        let left = walk_triangles(&mut polygons, &[], &points, &Monitor::default()).expect("not cancelled");
+        let left = walk_triangles(&mut polygons, &[], &points, &Monitor::default())
+            .expect("not cancelled");
         assert_eq!(left, 0);
         assert_eq!(polygons.iter().flatten().count(), 6);
     }
