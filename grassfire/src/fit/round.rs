@@ -21,8 +21,6 @@ pub(super) struct Solver<'a> {
     pub fairness: Vec<f64>,
     /// Factor on the data of each sample.
     pub trust: Vec<f64>,
-    /// Pull of each control point towards a place, relative to the data; empty for none.
-    pub pins: Vec<(u32, f64, Vec3)>,
 }
 
 /// Weights of one round.
@@ -50,7 +48,6 @@ impl<'a> Solver<'a> {
             equations,
             fairness: vec![1.0; surface.coarse.point_count],
             trust: vec![1.0; surface.samples.rows()],
-            pins: Vec::new(),
         })
     }
 
@@ -134,9 +131,22 @@ impl<'a> Solver<'a> {
         for (p, place) in points.iter().enumerate() {
             self.equations.pin(p as u32, 1e-3 * mean_area, place);
         }
-        for (p, weight, place) in &self.pins {
-            self.equations.pin(*p, weight * mean_area, place);
+    }
+
+    /// Makes the net as straight as possible at the control points that are `near`; the others stay.
+    pub fn smooth(&mut self, points: &[Vec3], near: &[bool]) -> Result<Vec<Vec3>, FitError> {
+        let identity = Matrix3::identity();
+        self.equations.clear();
+        for (p, place) in points.iter().enumerate() {
+            if near[p] {
+                let (indices, weights) = self.surface.bending.row(p);
+                self.equations.add(indices, weights, &identity, &Vec3::zeros());
+                let (indices, weights) = self.surface.laplacian.row(p);
+                self.equations.add(indices, weights, &(0.02 * identity), &Vec3::zeros());
+            }
+            self.equations.pin(p as u32, if near[p] { 1e-3 } else { 1e6 }, place);
         }
+        self.equations.solve().map_err(|reason| FitError::Solver { round: 0, reason })
     }
 
     /// Distances of the limit surface to f = 0, by flow along the gradient.

@@ -28,6 +28,8 @@ pub(super) struct Surface {
     pub triangles: Vec<[u32; 3]>,
     /// Control quad of each triangle.
     pub owner: Vec<u32>,
+    /// Samples and triangles after one more split, for the volume.
+    finer: (Stencils, Vec<[u32; 3]>),
     origin: Vec3,
     spacing: f64,
 }
@@ -40,9 +42,11 @@ impl Surface {
         let laplacian = coarse.laplacian();
         let bending = laplacian.after(&laplacian);
         let (triangles, owner) = triangles_of(&fine.quads, LEVELS);
+        let (finest, topology) = limit_operator(n, &body.mesh.quads, LEVELS + 1)?;
+        let finer = (finest, triangles_of(&topology.quads, LEVELS + 1).0);
         let thickened = body.mesh.points.iter().map(|p| field.to_grid(p)).collect();
         let (origin, spacing) = (field.origin, field.spacing);
-        Ok(Self { coarse, fine, samples, laplacian, bending, thickened, triangles, owner, origin, spacing })
+        Ok(Self { coarse, fine, samples, laplacian, bending, thickened, triangles, owner, finer, origin, spacing })
     }
 
     /// Control points whose limit surface follows the thickened points, damped towards them.
@@ -102,9 +106,13 @@ impl Surface {
         TriMesh { points: samples, triangles: self.triangles.clone(), tags: Vec::new() }
     }
 
-    /// Volume inside the limit surface, mm3.
+    /// Volume inside the limit surface, mm3: triangles after two and three splits, extrapolated (the
+    /// error of inscribed triangles falls by four with every split).
     pub fn volume(&self, points: &[Vec3]) -> f64 {
-        self.triangle_mesh(self.samples.apply(points)).volume() * self.spacing.powi(3)
+        let coarse = self.triangle_mesh(self.samples.apply(points)).volume();
+        let (triangles, points) = (self.finer.1.clone(), self.finer.0.apply(points));
+        let fine = TriMesh { points, triangles, tags: Vec::new() }.volume();
+        (fine + (fine - coarse) / 3.0) * self.spacing.powi(3)
     }
 
     /// A position in mm.
