@@ -217,9 +217,16 @@ pub fn fit(
     let iso = targets::iso_samples(field, options.iso_samples)?;
     let mut solver = round::Solver::new(&surface, field, &iso, options)?;
     let mut points = surface.damped_start()?;
-    let mut fitted = Fitted { iso_volume: targets::volume(field), ..Fitted::default() };
+    let mut fitted = Fitted {
+        iso_volume: targets::volume(field),
+        ..Fitted::default()
+    };
     for round in 0..options.rounds {
-        monitor.step(STAGE, "rounds", 0.05 + 0.6 * f64::from(round) / f64::from(options.rounds))?;
+        monitor.step(
+            STAGE,
+            "rounds",
+            0.05 + 0.6 * f64::from(round) / f64::from(options.rounds),
+        )?;
         fitted.rounds.push(solver.round(&mut points, round)?);
     }
     untangle::untangle(&mut solver, &mut points, &mut fitted, options, monitor)?;
@@ -248,31 +255,83 @@ fn check_options(options: &FitOptions) -> Result<(), FitError> {
         if value.is_finite() && value >= lo && value <= hi {
             Ok(())
         } else {
-            Err(FitError::BadOption { name, value, allowed })
+            Err(FitError::BadOption {
+                name,
+                value,
+                allowed,
+            })
         }
     };
     inside("rounds", f64::from(options.rounds), 0.0, 200.0, "0 to 200")?;
-    inside("regrow_rounds", f64::from(options.regrow_rounds), 0.0, 200.0, "0 to 200")?;
-    inside("untangle_rounds", f64::from(options.untangle_rounds), 0.0, 200.0, "0 to 200")?;
+    inside(
+        "regrow_rounds",
+        f64::from(options.regrow_rounds),
+        0.0,
+        200.0,
+        "0 to 200",
+    )?;
+    inside(
+        "untangle_rounds",
+        f64::from(options.untangle_rounds),
+        0.0,
+        200.0,
+        "0 to 200",
+    )?;
     inside("fairness", options.fairness, 1e-6, 1e3, "1e-6 to 1000")?;
-    inside("iso_samples", options.iso_samples as f64, 0.0, 1e7, "at most 10 million")?;
-    inside("max_step", options.max_step, 1e-3, 1e3, "0.001 to 1000 voxels")?;
-    inside("max_volume_loss", options.max_volume_loss, 0.0, 1.0, "0 to 1")?;
-    inside("max_rms_growth", options.max_rms_growth, 0.0, 100.0, "0 to 100")
+    inside(
+        "iso_samples",
+        options.iso_samples as f64,
+        0.0,
+        1e7,
+        "at most 10 million",
+    )?;
+    inside(
+        "max_step",
+        options.max_step,
+        1e-3,
+        1e3,
+        "0.001 to 1000 voxels",
+    )?;
+    inside(
+        "max_volume_loss",
+        options.max_volume_loss,
+        0.0,
+        1.0,
+        "0 to 1",
+    )?;
+    inside(
+        "max_rms_growth",
+        options.max_rms_growth,
+        0.0,
+        100.0,
+        "0 to 100",
+    )
 }
 
-fn check_input(body: &ThickenedBody, skeleton: &Skeleton, field: &VoxelGrid<f32>) -> Result<(), FitError> {
+fn check_input(
+    body: &ThickenedBody,
+    skeleton: &Skeleton,
+    field: &VoxelGrid<f32>,
+) -> Result<(), FitError> {
     let [nx, ny, nz] = field.dims;
     let count = nx.checked_mul(ny).and_then(|n| n.checked_mul(nz));
-    let placed = field.spacing > 0.0 && field.spacing.is_finite() && field.origin.iter().all(|x| x.is_finite());
+    let placed = field.spacing > 0.0
+        && field.spacing.is_finite()
+        && field.origin.iter().all(|x| x.is_finite());
     let finite = field.values.iter().all(|f| f.is_finite());
-    if count != Some(field.values.len()) || field.dims.iter().any(|&n| n < 2) || !placed || !finite {
+    if count != Some(field.values.len()) || field.dims.iter().any(|&n| n < 2) || !placed || !finite
+    {
         return Err(FitError::BadField { dims: field.dims });
     }
     for (i, p) in body.mesh.points.iter().enumerate() {
         let source = body.source.get(i).copied().unwrap_or(u32::MAX);
-        if source as usize >= skeleton.points.len() || p.iter().any(|x| !x.is_finite() || x.abs() > 1e9) {
-            return Err(FitError::BadPoint { point: i as u32, source_point: source });
+        if source as usize >= skeleton.points.len()
+            || p.iter().any(|x| !x.is_finite() || x.abs() > 1e9)
+        {
+            return Err(FitError::BadPoint {
+                point: i as u32,
+                source_point: source,
+            });
         }
     }
     Ok(())

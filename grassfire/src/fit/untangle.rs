@@ -45,11 +45,20 @@ pub(super) fn untangle(
         let after = regrow(solver, &mut trial, start, way, fitted, options, monitor)?;
         let now = state(solver, &trial, &after);
         let passes = now.rms <= reference.rms * (1.0 + options.max_rms_growth)
-            && now.volume >= reference.volume.min(fitted.iso_volume) * (1.0 - options.max_volume_loss)
+            && now.volume
+                >= reference.volume.min(fitted.iso_volume) * (1.0 - options.max_volume_loss)
             && after.pairs.len() < left.pairs.len();
         if passes {
-            fitted.untangle_rounds.iter_mut().take(first).for_each(|r| r.accepted = false);
-            fitted.untangle_rounds.iter_mut().skip(first).for_each(|r| r.accepted = true);
+            fitted
+                .untangle_rounds
+                .iter_mut()
+                .take(first)
+                .for_each(|r| r.accepted = false);
+            fitted
+                .untangle_rounds
+                .iter_mut()
+                .skip(first)
+                .for_each(|r| r.accepted = true);
             left = after;
             *points = trial;
         }
@@ -121,14 +130,26 @@ fn unfold(
         if found.pairs.is_empty() {
             break;
         }
-        monitor.step(STAGE, "untangling", 0.65 + 0.15 * f64::from(round) / f64::from(options.untangle_rounds))?;
+        monitor.step(
+            STAGE,
+            "untangling",
+            0.65 + 0.15 * f64::from(round) / f64::from(options.untangle_rounds),
+        )?;
         let near = found.control_points(solver, 1);
-        for (factor, _) in solver.fairness.iter_mut().zip(&near).filter(|(_, near)| **near) {
+        for (factor, _) in solver
+            .fairness
+            .iter_mut()
+            .zip(&near)
+            .filter(|(_, near)| **near)
+        {
             *factor = (*factor * 6.0).min(2000.0);
         }
         for j in 0..solver.trust.len() {
             let (indices, weights) = solver.surface.samples.row(j);
-            let inside = indices.iter().zip(weights).filter(|(p, _)| near[**p as usize]);
+            let inside = indices
+                .iter()
+                .zip(weights)
+                .filter(|(p, _)| near[**p as usize]);
             let share: f64 = inside.map(|x| x.1).sum();
             solver.trust[j] *= 1.0 - 0.6 * share.clamp(0.0, 1.0);
         }
@@ -167,15 +188,23 @@ fn regrow(
     solver.trust.fill(1.0);
     solver.fairness.fill(1.0);
     for round in 0..rounds {
-        monitor.step(STAGE, "regrowing", 0.8 + 0.15 * f64::from(round) / f64::from(rounds))?;
+        monitor.step(
+            STAGE,
+            "regrowing",
+            0.8 + 0.15 * f64::from(round) / f64::from(rounds),
+        )?;
         let mut wanted = points.clone();
         solver.round(&mut wanted, first + round)?;
         let mut share = vec![1.0; points.len()];
         let mut accepted = None;
         let mut last = found.clone();
         for attempt in 0..10 {
-            let trial: Vec<Vec3> =
-                points.iter().zip(&wanted).zip(&share).map(|((p, w), s)| p + *s * (w - p)).collect();
+            let trial: Vec<Vec3> = points
+                .iter()
+                .zip(&wanted)
+                .zip(&share)
+                .map(|((p, w), s)| p + *s * (w - p))
+                .collect();
             last = Tangles::of(solver, &trial);
             if last.pairs.len() <= found.pairs.len() {
                 accepted = Some(trial);
@@ -190,7 +219,12 @@ fn regrow(
             }
             if attempt == 1 {
                 let near = last.control_points(solver, 1);
-                for (f, _) in solver.fairness.iter_mut().zip(&near).filter(|(_, near)| **near) {
+                for (f, _) in solver
+                    .fairness
+                    .iter_mut()
+                    .zip(&near)
+                    .filter(|(_, near)| **near)
+                {
                     *f = (*f * 2.0).min(200.0);
                 }
             }
@@ -201,7 +235,11 @@ fn regrow(
         found = tangles;
         let now = state(solver, points, &found);
         fitted.untangle_rounds.push(now);
-        settled = if now.rms > 0.995 * rms { settled + 1 } else { 0 };
+        settled = if now.rms > 0.995 * rms {
+            settled + 1
+        } else {
+            0
+        };
         rms = now.rms;
         if settled == 3 {
             break;
@@ -224,7 +262,11 @@ impl Tangles {
         let surface = solver.surface;
         let mesh = surface.triangle_mesh(surface.samples.apply(points));
         let pairs = self_intersections(&mesh);
-        let mut quads: Vec<u32> = pairs.iter().flatten().map(|&t| surface.owner[t as usize]).collect();
+        let mut quads: Vec<u32> = pairs
+            .iter()
+            .flatten()
+            .map(|&t| surface.owner[t as usize])
+            .collect();
         quads.sort_unstable();
         quads.dedup();
         Self { mesh, pairs, quads }
@@ -235,7 +277,9 @@ impl Tangles {
         let coarse = &solver.surface.coarse;
         let mut near = vec![false; coarse.point_count];
         for &q in &self.quads {
-            coarse.quads[q as usize].iter().for_each(|&v| near[v as usize] = true);
+            coarse.quads[q as usize]
+                .iter()
+                .for_each(|&v| near[v as usize] = true);
         }
         for _ in 0..rings {
             let inner = near.clone();
@@ -265,7 +309,9 @@ impl Tangles {
         };
         let first = |q: u32| surface.coarse.quads[q as usize][0];
         for &q in &self.quads {
-            surface.coarse.quads[q as usize].iter().for_each(|&v| unite(first(q), v));
+            surface.coarse.quads[q as usize]
+                .iter()
+                .for_each(|&v| unite(first(q), v));
         }
         for pair in &self.pairs {
             let [a, b] = pair.map(|t| surface.owner[t as usize]);
@@ -273,7 +319,11 @@ impl Tangles {
         }
         let mut groups: BTreeMap<usize, (Vec<u32>, Vec3, f64)> = BTreeMap::new();
         for &q in &self.quads {
-            groups.entry(root(&mut parent, first(q) as usize)).or_default().0.push(q);
+            groups
+                .entry(root(&mut parent, first(q) as usize))
+                .or_default()
+                .0
+                .push(q);
         }
         for &t in self.pairs.iter().flatten() {
             let key = root(&mut parent, first(surface.owner[t as usize]) as usize);
@@ -283,7 +333,10 @@ impl Tangles {
         }
         groups
             .into_values()
-            .map(|(quads, sum, count)| SelfIntersectionPlace { place: surface.to_mm(&(sum / count.max(1.0))), quads })
+            .map(|(quads, sum, count)| SelfIntersectionPlace {
+                place: surface.to_mm(&(sum / count.max(1.0))),
+                quads,
+            })
             .collect()
     }
 }
