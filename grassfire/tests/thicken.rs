@@ -12,14 +12,26 @@ use proptest::prelude::*;
 use thicken_support::{Builder, chi, read_skeleton, stages, v, x, y, z};
 
 fn body(skeleton: &Skeleton) -> ThickenedBody {
-    let options = ThickenOptions { scale: 1.0, ..ThickenOptions::default() };
+    let options = ThickenOptions {
+        scale: 1.0,
+        ..ThickenOptions::default()
+    };
     let body = thicken(skeleton, &options, &Monitor::default()).expect("thickens");
-    let topology = QuadTopology::new(body.mesh.points.len(), &body.mesh.quads).expect("closed, manifold, oriented");
+    let topology = QuadTopology::new(body.mesh.points.len(), &body.mesh.quads)
+        .expect("closed, manifold, oriented");
     assert_eq!(topology.euler(), 2 * chi(skeleton));
     assert!(topology.valence.iter().all(|&n| n >= 3));
-    assert!(body.bodies.iter().all(|b| b.volume > 0.0 && b.chi == 2 * b.skeleton_chi));
+    assert!(
+        body.bodies
+            .iter()
+            .all(|b| b.volume > 0.0 && b.chi == 2 * b.skeleton_chi)
+    );
     assert_eq!(body.source.len(), body.mesh.points.len());
-    assert!(body.source.iter().all(|&s| (s as usize) < skeleton.points.len()));
+    assert!(
+        body.source
+            .iter()
+            .all(|&s| (s as usize) < skeleton.points.len())
+    );
     body
 }
 
@@ -39,12 +51,20 @@ fn a_plate_has_the_expected_offsets() {
         assert!(((p - skeleton.points[s as usize]).norm() - 1.0).abs() < 1e-9);
     }
     let volume = body.bodies[0].volume;
-    assert!(volume > 40.0 * 30.0 * 2.0 * 0.95 && volume < 42.0 * 32.0 * 2.0, "{volume}");
+    assert!(
+        volume > 40.0 * 30.0 * 2.0 * 0.95 && volume < 42.0 * 32.0 * 2.0,
+        "{volume}"
+    );
 }
 
 #[test]
 fn seams_of_three_and_four_sheets() {
-    for directions in [vec![0.0, 120.0, 240.0], vec![0.0, 90.0, 180.0], vec![0.0, 90.0, 180.0, 270.0], vec![10.0, 80.0, 200.0, 290.0, 340.0]] {
+    for directions in [
+        vec![0.0, 120.0, 240.0],
+        vec![0.0, 90.0, 180.0],
+        vec![0.0, 90.0, 180.0, 270.0],
+        vec![10.0, 80.0, 200.0, 290.0, 340.0],
+    ] {
         let mut b = Builder::new(1.0);
         for angle in directions {
             let (s, c) = f64::to_radians(angle).sin_cos();
@@ -78,7 +98,13 @@ fn folded_and_rolled_sheets() {
         };
         for i in 0..12 {
             for h in 0..5 {
-                let quad = [ring(i, h), ring(i + 1, h), ring(i + 1, h + 1), ring(i, h + 1)].map(|p| tube.point(p));
+                let quad = [
+                    ring(i, h),
+                    ring(i + 1, h),
+                    ring(i + 1, h + 1),
+                    ring(i, h + 1),
+                ]
+                .map(|p| tube.point(p));
                 tube.skeleton.quads.push(quad);
             }
         }
@@ -105,7 +131,11 @@ fn a_moebius_strip_gives_one_closed_orientable_shell() {
         let turn = i as f64 / 24.0 * std::f64::consts::TAU;
         let (s, c) = (turn / 2.0).sin_cos();
         let w = (j as f64 - 1.0) * 4.0;
-        v((30.0 + w * c) * turn.cos(), (30.0 + w * c) * turn.sin(), w * s)
+        v(
+            (30.0 + w * c) * turn.cos(),
+            (30.0 + w * c) * turn.sin(),
+            w * s,
+        )
     };
     for i in 0..24 {
         for j in 0..2 {
@@ -164,7 +194,11 @@ fn many_beams_on_one_sheet_vertex() {
     let mut b = plate();
     for i in 0..14 {
         let (s, c) = (f64::from(i) * 0.9).sin_cos();
-        b.beam(v(20.0, 15.0, 0.0), v(20.0 + 9.0 * c, 15.0 + 9.0 * s, 20.0 - f64::from(i)), 2);
+        b.beam(
+            v(20.0, 15.0, 0.0),
+            v(20.0 + 9.0 * c, 15.0 + 9.0 * s, 20.0 - f64::from(i)),
+            2,
+        );
     }
     assert_eq!(body(&b.skeleton).rules.plug_feet, 14);
 }
@@ -184,7 +218,10 @@ fn loops_tips_balls_and_one_edge_beams() {
     let mut ball = Builder::new(2.0);
     ball.beam(Vec3::zeros(), x(1.0), 1);
     let made = body(&ball.skeleton);
-    assert_eq!((made.mesh.quads.len(), made.rules.tips, made.rules.middles), (10, 2, 1));
+    assert_eq!(
+        (made.mesh.quads.len(), made.rules.tips, made.rules.middles),
+        (10, 2, 1)
+    );
     let mut triangle = Builder::new(1.0);
     let corners = [v(0.0, 0.0, 0.0), v(20.0, 0.0, 0.0), v(0.0, 20.0, 0.0)];
     for k in 0..3 {
@@ -208,14 +245,19 @@ fn sheets_that_touch_in_a_point() {
         };
         for i in 0..4 {
             for j in 0..4 {
-                let quad = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)].map(|p| cups.point(p));
+                let quad =
+                    [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)].map(|p| cups.point(p));
                 cups.skeleton.quads.push(quad);
             }
         }
     }
     assert_eq!(body(&cups.skeleton).rules.ties, 1);
     let mut standing = plate();
-    standing.sheet(v(20.0, 15.0, 0.0), [v(5.0, 0.0, 9.0), v(-5.0, 0.0, 9.0)], [2, 2]);
+    standing.sheet(
+        v(20.0, 15.0, 0.0),
+        [v(5.0, 0.0, 9.0), v(-5.0, 0.0, 9.0)],
+        [2, 2],
+    );
     assert_eq!(body(&standing.skeleton).rules.ties, 1);
 }
 
@@ -230,13 +272,22 @@ fn several_bodies_are_counted() {
 #[test]
 fn bad_skeletons_are_refused_by_name() {
     let run = |s: &Skeleton| thicken(s, &ThickenOptions::default(), &Monitor::default());
-    assert!(matches!(run(&Skeleton::default()), Err(ThickenError::Empty)));
+    assert!(matches!(
+        run(&Skeleton::default()),
+        Err(ThickenError::Empty)
+    ));
     let mut zero = plate().skeleton;
     zero.radii[3] = 0.0;
-    assert!(matches!(run(&zero), Err(ThickenError::BadPoint { point: 3, .. })));
+    assert!(matches!(
+        run(&zero),
+        Err(ThickenError::BadPoint { point: 3, .. })
+    ));
     let mut missing = plate().skeleton;
     missing.quads[5][2] = 9999;
-    assert!(matches!(run(&missing), Err(ThickenError::BadQuad { quad: 5 })));
+    assert!(matches!(
+        run(&missing),
+        Err(ThickenError::BadQuad { quad: 5 })
+    ));
     let mut short = plate().skeleton;
     short.radii.pop();
     assert!(matches!(run(&short), Err(ThickenError::BadCount { .. })));
@@ -250,17 +301,29 @@ fn bad_skeletons_are_refused_by_name() {
     assert_eq!(monitor.warnings().len(), 1);
     let stopped = Monitor::default();
     stopped.cancel();
-    assert!(matches!(thicken(&doubled, &ThickenOptions::default(), &stopped), Err(ThickenError::Cancelled(_))));
+    assert!(matches!(
+        thicken(&doubled, &ThickenOptions::default(), &stopped),
+        Err(ThickenError::Cancelled(_))
+    ));
 }
 
 #[test]
 fn real_parts_give_the_quads_of_the_prototype() {
     let Some(folder) = stages() else { return };
-    for (part, quads) in [("simjeb_055", 880), ("simjeb_398", 750), ("simjeb_576", 752), ("simjeb_623", 580)] {
+    for (part, quads) in [
+        ("simjeb_055", 880),
+        ("simjeb_398", 750),
+        ("simjeb_576", 752),
+        ("simjeb_623", 580),
+    ] {
         let skeleton = read_skeleton(&folder.join(part).join("skeleton.ply"));
         let made = body(&skeleton);
         println!("{part}: {:?} {:?}", made.bodies, made.rules);
-        assert!(made.mesh.quads.len().abs_diff(quads) <= 16, "{part}: {}", made.mesh.quads.len());
+        assert!(
+            made.mesh.quads.len().abs_diff(quads) <= 16,
+            "{part}: {}",
+            made.mesh.quads.len()
+        );
     }
 }
 

@@ -53,8 +53,16 @@ impl Equations {
             offsets.push(rows.len());
         }
         let (pattern, count) = scalar_pattern(n, &offsets, &rows);
-        let symbolic = SymbolicLlt::try_new(pattern.as_ref(), Side::Lower).map_err(|e| format!("{e:?}"))?;
-        Ok(Self { offsets, rows, values: vec![0.0; count], right: vec![0.0; 3 * n], pattern, symbolic })
+        let symbolic =
+            SymbolicLlt::try_new(pattern.as_ref(), Side::Lower).map_err(|e| format!("{e:?}"))?;
+        Ok(Self {
+            offsets,
+            rows,
+            values: vec![0.0; count],
+            right: vec![0.0; 3 * n],
+            pattern,
+            symbolic,
+        })
     }
 
     /// Sets everything to zero.
@@ -73,7 +81,10 @@ impl Equations {
             let base = 9 * first;
             let mut at = 0;
             for (&r, &wr) in points[i..].iter().zip(&weights[i..]) {
-                at += column[at..].iter().position(|&x| x == r).expect("the pattern was made from these rows");
+                at += column[at..]
+                    .iter()
+                    .position(|&x| x == r)
+                    .expect("the pattern was made from these rows");
                 let w = wc * wr;
                 for j in 0..3 {
                     let start = base + j * height + 3 * at;
@@ -90,7 +101,12 @@ impl Equations {
 
     /// Adds `weight |x_p - place|^2` for one point.
     pub fn pin(&mut self, p: u32, weight: f64, place: &Vec3) {
-        self.add(&[p], &[1.0], &(weight * Matrix3::identity()), &(weight * place));
+        self.add(
+            &[p],
+            &[1.0],
+            &(weight * Matrix3::identity()),
+            &(weight * place),
+        );
     }
 
     /// Solves the system.
@@ -101,8 +117,9 @@ impl Equations {
         let mut x = Mat::from_fn(self.right.len(), 1, |i, _| self.right[i]);
         llt.solve_in_place(&mut x);
         let n = self.right.len() / 3;
-        let points: Vec<Vec3> =
-            (0..n).map(|p| Vec3::new(x[(3 * p, 0)], x[(3 * p + 1, 0)], x[(3 * p + 2, 0)])).collect();
+        let points: Vec<Vec3> = (0..n)
+            .map(|p| Vec3::new(x[(3 * p, 0)], x[(3 * p + 1, 0)], x[(3 * p + 2, 0)]))
+            .collect();
         if points.iter().any(|p| p.iter().any(|x| !x.is_finite())) {
             return Err("the solution is not finite".to_owned());
         }
@@ -111,7 +128,11 @@ impl Equations {
 }
 
 /// Expands the block pattern; every column holds all three scalars of each block.
-fn scalar_pattern(n: usize, offsets: &[usize], rows: &[u32]) -> (SymbolicSparseColMat<usize>, usize) {
+fn scalar_pattern(
+    n: usize,
+    offsets: &[usize],
+    rows: &[u32],
+) -> (SymbolicSparseColMat<usize>, usize) {
     let mut pointers = vec![0];
     let mut indices = Vec::with_capacity(9 * rows.len());
     for c in 0..n {
@@ -124,7 +145,10 @@ fn scalar_pattern(n: usize, offsets: &[usize], rows: &[u32]) -> (SymbolicSparseC
         }
     }
     let count = indices.len();
-    (SymbolicSparseColMat::new_checked(3 * n, 3 * n, pointers, None, indices), count)
+    (
+        SymbolicSparseColMat::new_checked(3 * n, 3 * n, pointers, None, indices),
+        count,
+    )
 }
 
 #[cfg(test)]
@@ -134,11 +158,15 @@ mod tests {
     #[test]
     fn solves_a_small_weighted_system() {
         let mut rows = Stencils::new(3);
-        rows.push(&mut vec![(0, 1.0)]);
-        rows.push(&mut vec![(0, -1.0), (2, 1.0)]);
-        rows.push(&mut vec![(1, 0.5), (2, 0.5)]);
+        rows.push(&mut [(0, 1.0)]);
+        rows.push(&mut [(0, -1.0), (2, 1.0)]);
+        rows.push(&mut [(1, 0.5), (2, 0.5)]);
         let mut equations = Equations::new(&[&rows]).expect("pattern");
-        let targets = [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, -1.0, 0.5), Vec3::new(0.0, 1.0, 7.0)];
+        let targets = [
+            Vec3::new(1.0, 2.0, 3.0),
+            Vec3::new(4.0, -1.0, 0.5),
+            Vec3::new(0.0, 1.0, 7.0),
+        ];
         let block = Matrix3::new(2.0, 0.3, 0.1, 0.3, 1.0, -0.2, 0.1, -0.2, 1.5);
         for _ in 0..2 {
             equations.clear();

@@ -33,20 +33,20 @@ pub struct FitOptions {
     pub iso_samples: usize,
     /// Largest move of a control point in a round, voxels.
     pub max_step: f64,
-    /// Largest number of untangling rounds; 0 switches untangling off.
+    /// Largest number of unfolding rounds; 0 switches untangling off.
     pub untangle_rounds: u32,
     /// Rounds that give back what untangling took, without new intersections.
     pub regrow_rounds: u32,
-    /// An untangling round may lower the volume by at most this fraction.
+    /// Untangling may lower the volume by at most this fraction.
     pub max_volume_loss: f64,
-    /// An untangling round may raise the rms distance by at most this fraction.
+    /// Untangling may raise the rms distance by at most this fraction.
     pub max_rms_growth: f64,
 }
 
 impl Default for FitOptions {
     fn default() -> Self {
         Self {
-            rounds: 14,
+            rounds: 16,
             fairness: 0.02,
             iso_samples: 20_000,
             max_step: 4.0,
@@ -76,7 +76,7 @@ pub struct UntangleRound {
     pub rms: f64,
     /// Volume afterwards, mm3.
     pub volume: f64,
-    /// The guards let it pass and it was an improvement.
+    /// It belongs to the way that led to the result; the guards let it pass.
     pub accepted: bool,
 }
 
@@ -118,7 +118,7 @@ pub struct Fitted {
     pub body_to_iso: Distances,
     /// Iso-surface to limit surface (nearest triangle among those around the nearest sample).
     pub iso_to_body: Distances,
-    /// Volume of the limit mesh (two splits), mm3.
+    /// Volume inside the limit surface, mm3.
     pub volume: f64,
     /// Volume of the region f > 0, mm3.
     pub iso_volume: f64,
@@ -138,8 +138,8 @@ pub enum FitError {
         /// Its skeleton point.
         source_point: u32,
     },
-    /// The field has no surface f = 0 or its size does not match its values.
-    #[error("the field of {} x {} x {} voxels has no surface to fit to", dims[0], dims[1], dims[2])]
+    /// The field has no surface f = 0, its size does not match its values, or one is not finite.
+    #[error("the field of {} x {} x {} voxels has no surface to fit to, or values that are not finite", dims[0], dims[1], dims[2])]
     BadField {
         /// Voxels along x, y, z.
         dims: [usize; 3],
@@ -190,10 +190,12 @@ impl FitError {
 ///    without which tips and corners are never reached. Weights: area, agreement of normals, and a
 ///    cap on far samples that tightens from round to round. Tangential damping and fairness
 ///    |Lap Lap X|^2 + 0.02 |Lap X|^2 keep the net regular; steps are clamped.
-/// 3. Untangling: where the limit mesh (two splits) intersects itself, the control points around are
-///    drawn towards a calm target and the data there counts less. A round that loses more volume or
-///    accuracy than the options allow is undone and tried again in a gentler way; places that stay
-///    are reported in [`Fitted::self_intersections`] and as a warning, never hidden.
+/// 3. Untangling: where the limit mesh (two splits) intersects itself, fairness grows and data
+///    counts less until it does not; then rounds with all data give back what that took, their steps
+///    shortened wherever they would create an intersection. If places are left, or more volume or
+///    accuracy is lost than the options allow, the same is tried from the thin start of the fit,
+///    where little is in the way. Places that stay are reported in [`Fitted::self_intersections`]
+///    and as a warning, never hidden.
 ///
 /// The normal equations are one sparse Cholesky system; its symbolic factorisation is made once.
 /// Memory and time grow nearly linearly with the quads. The result does not depend on the number of
@@ -215,9 +217,16 @@ pub fn fit(
     let iso = targets::iso_samples(field, options.iso_samples)?;
     let mut solver = round::Solver::new(&surface, field, &iso, options)?;
     let mut points = surface.damped_start()?;
-    let mut fitted = Fitted { iso_volume: targets::volume(field), ..Fitted::default() };
+    let mut fitted = Fitted {
+        iso_volume: targets::volume(field),
+        ..Fitted::default()
+    };
     for round in 0..options.rounds {
-        monitor.step(STAGE, "rounds", 0.05 + 0.6 * f64::from(round) / f64::from(options.rounds))?;
+        monitor.step(
+            STAGE,
+            "rounds",
+            0.05 + 0.6 * f64::from(round) / f64::from(options.rounds),
+        )?;
         fitted.rounds.push(solver.round(&mut points, round)?);
     }
     untangle::untangle(&mut solver, &mut points, &mut fitted, options, monitor)?;
@@ -246,29 +255,83 @@ fn check_options(options: &FitOptions) -> Result<(), FitError> {
         if value.is_finite() && value >= lo && value <= hi {
             Ok(())
         } else {
-            Err(FitError::BadOption { name, value, allowed })
+            Err(FitError::BadOption {
+                name,
+                value,
+                allowed,
+            })
         }
     };
     inside("rounds", f64::from(options.rounds), 0.0, 200.0, "0 to 200")?;
-    inside("untangle_rounds", f64::from(options.untangle_rounds), 0.0, 200.0, "0 to 200")?;
+    inside(
+        "regrow_rounds",
+        f64::from(options.regrow_rounds),
+        0.0,
+        200.0,
+        "0 to 200",
+    )?;
+    inside(
+        "untangle_rounds",
+        f64::from(options.untangle_rounds),
+        0.0,
+        200.0,
+        "0 to 200",
+    )?;
     inside("fairness", options.fairness, 1e-6, 1e3, "1e-6 to 1000")?;
-    inside("iso_samples", options.iso_samples as f64, 0.0, 1e7, "at most 10 million")?;
-    inside("max_step", options.max_step, 1e-3, 1e3, "0.001 to 1000 voxels")?;
-    inside("max_volume_loss", options.max_volume_loss, 0.0, 1.0, "0 to 1")?;
-    inside("max_rms_growth", options.max_rms_growth, 0.0, 100.0, "0 to 100")
+    inside(
+        "iso_samples",
+        options.iso_samples as f64,
+        0.0,
+        1e7,
+        "at most 10 million",
+    )?;
+    inside(
+        "max_step",
+        options.max_step,
+        1e-3,
+        1e3,
+        "0.001 to 1000 voxels",
+    )?;
+    inside(
+        "max_volume_loss",
+        options.max_volume_loss,
+        0.0,
+        1.0,
+        "0 to 1",
+    )?;
+    inside(
+        "max_rms_growth",
+        options.max_rms_growth,
+        0.0,
+        100.0,
+        "0 to 100",
+    )
 }
 
-fn check_input(body: &ThickenedBody, skeleton: &Skeleton, field: &VoxelGrid<f32>) -> Result<(), FitError> {
+fn check_input(
+    body: &ThickenedBody,
+    skeleton: &Skeleton,
+    field: &VoxelGrid<f32>,
+) -> Result<(), FitError> {
     let [nx, ny, nz] = field.dims;
     let count = nx.checked_mul(ny).and_then(|n| n.checked_mul(nz));
-    let placed = field.spacing > 0.0 && field.spacing.is_finite() && field.origin.iter().all(|x| x.is_finite());
-    if count != Some(field.values.len()) || field.dims.iter().any(|&n| n < 2) || !placed {
+    let placed = field.spacing > 0.0
+        && field.spacing.is_finite()
+        && field.origin.iter().all(|x| x.is_finite());
+    let finite = field.values.iter().all(|f| f.is_finite());
+    if count != Some(field.values.len()) || field.dims.iter().any(|&n| n < 2) || !placed || !finite
+    {
         return Err(FitError::BadField { dims: field.dims });
     }
     for (i, p) in body.mesh.points.iter().enumerate() {
         let source = body.source.get(i).copied().unwrap_or(u32::MAX);
-        if source as usize >= skeleton.points.len() || p.iter().any(|x| !x.is_finite() || x.abs() > 1e9) {
-            return Err(FitError::BadPoint { point: i as u32, source_point: source });
+        if source as usize >= skeleton.points.len()
+            || p.iter().any(|x| !x.is_finite() || x.abs() > 1e9)
+        {
+            return Err(FitError::BadPoint {
+                point: i as u32,
+                source_point: source,
+            });
         }
     }
     Ok(())

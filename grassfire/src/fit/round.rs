@@ -21,8 +21,6 @@ pub(super) struct Solver<'a> {
     pub fairness: Vec<f64>,
     /// Factor on the data of each sample.
     pub trust: Vec<f64>,
-    /// Pull of each control point towards a place, relative to the data; empty for none.
-    pub pins: Vec<(u32, f64, Vec3)>,
 }
 
 /// Weights of one round.
@@ -50,7 +48,6 @@ impl<'a> Solver<'a> {
             equations,
             fairness: vec![1.0; surface.coarse.point_count],
             trust: vec![1.0; surface.samples.rows()],
-            pins: Vec::new(),
         })
     }
 
@@ -69,7 +66,10 @@ impl<'a> Solver<'a> {
         self.equations.clear();
         let distance = self.add_data(&at, &normals, &areas, &schedule);
         self.add_fairness(points, mean_area, schedule.fairness);
-        let solution = self.equations.solve().map_err(|reason| FitError::Solver { round, reason })?;
+        let solution = self
+            .equations
+            .solve()
+            .map_err(|reason| FitError::Solver { round, reason })?;
         let mut total = 0.0;
         for (p, wanted) in points.iter_mut().zip(&solution) {
             let step = wanted - *p;
@@ -78,13 +78,25 @@ impl<'a> Solver<'a> {
             total += length;
         }
         let mm = self.field.spacing;
-        Ok(FitRound { mean_distance: mm * distance / area.max(1e-300), step: mm * total / points.len().max(1) as f64 })
+        Ok(FitRound {
+            mean_distance: mm * distance / area.max(1e-300),
+            step: mm * total / points.len().max(1) as f64,
+        })
     }
 
     /// Point-to-plane rows both ways and tangential damping; returns the area-weighted distance sum.
-    fn add_data(&mut self, at: &[Vec3], normals: &[Vec3], areas: &[f64], schedule: &Schedule) -> f64 {
-        let flowed: Vec<(Vec3, Vec3)> =
-            at.par_iter().with_min_len(512).map(|p| flow_to_surface(self.field, p, 6)).collect();
+    fn add_data(
+        &mut self,
+        at: &[Vec3],
+        normals: &[Vec3],
+        areas: &[f64],
+        schedule: &Schedule,
+    ) -> f64 {
+        let flowed: Vec<(Vec3, Vec3)> = at
+            .par_iter()
+            .with_min_len(512)
+            .map(|p| flow_to_surface(self.field, p, 6))
+            .collect();
         let mut blocks = vec![Matrix3::zeros(); at.len()];
         let mut pulls = vec![Vec3::zeros(); at.len()];
         let mut sum = 0.0;
@@ -93,7 +105,10 @@ impl<'a> Solver<'a> {
             sum += areas[j] * d;
             let cosine = outward.dot(&normals[j]);
             if cosine >= 0.2 {
-                let w = self.trust[j] * areas[j] * cosine.min(1.0) * (schedule.cap / d.max(1e-9)).min(1.0);
+                let w = self.trust[j]
+                    * areas[j]
+                    * cosine.min(1.0)
+                    * (schedule.cap / d.max(1e-9)).min(1.0);
                 blocks[j] += w * outward * outward.transpose();
                 pulls[j] += w * outward * outward.dot(place);
             }
@@ -103,9 +118,15 @@ impl<'a> Solver<'a> {
         }
         let share = areas.iter().sum::<f64>() / self.iso.points.len().max(1) as f64;
         let grid = PointGrid::new(at, 1.5);
-        let nearest: Vec<Option<(u32, f64)>> =
-            self.iso.points.par_iter().with_min_len(512).map(|p| grid.nearest(at, p)).collect();
-        for ((place, outward), found) in self.iso.points.iter().zip(&self.iso.normals).zip(&nearest) {
+        let nearest: Vec<Option<(u32, f64)>> = self
+            .iso
+            .points
+            .par_iter()
+            .with_min_len(512)
+            .map(|p| grid.nearest(at, p))
+            .collect();
+        for ((place, outward), found) in self.iso.points.iter().zip(&self.iso.normals).zip(&nearest)
+        {
             let Some((j, d)) = *found else { continue };
             let j = j as usize;
             let cosine = outward.dot(&normals[j]);
@@ -127,16 +148,40 @@ impl<'a> Solver<'a> {
         for r in 0..points.len() {
             let weight = fairness * mean_area * self.fairness[r];
             let (indices, weights) = self.surface.bending.row(r);
-            self.equations.add(indices, weights, &(weight * identity), &Vec3::zeros());
+            self.equations
+                .add(indices, weights, &(weight * identity), &Vec3::zeros());
             let (indices, weights) = self.surface.laplacian.row(r);
-            self.equations.add(indices, weights, &(0.02 * fairness * mean_area * identity), &Vec3::zeros());
+            self.equations.add(
+                indices,
+                weights,
+                &(0.02 * fairness * mean_area * identity),
+                &Vec3::zeros(),
+            );
         }
         for (p, place) in points.iter().enumerate() {
             self.equations.pin(p as u32, 1e-3 * mean_area, place);
         }
-        for (p, weight, place) in &self.pins {
-            self.equations.pin(*p, weight * mean_area, place);
+    }
+
+    /// Makes the net as straight as possible at the control points that are `near`; the others stay.
+    pub fn smooth(&mut self, points: &[Vec3], near: &[bool]) -> Result<Vec<Vec3>, FitError> {
+        let identity = Matrix3::identity();
+        self.equations.clear();
+        for (p, place) in points.iter().enumerate() {
+            if near[p] {
+                let (indices, weights) = self.surface.bending.row(p);
+                self.equations
+                    .add(indices, weights, &identity, &Vec3::zeros());
+                let (indices, weights) = self.surface.laplacian.row(p);
+                self.equations
+                    .add(indices, weights, &(0.02 * identity), &Vec3::zeros());
+            }
+            self.equations
+                .pin(p as u32, if near[p] { 1e-3 } else { 1e6 }, place);
         }
+        self.equations
+            .solve()
+            .map_err(|reason| FitError::Solver { round: 0, reason })
     }
 
     /// Distances of the limit surface to f = 0, by flow along the gradient.
@@ -157,7 +202,9 @@ impl<'a> Solver<'a> {
         let grid = PointGrid::new(&at, 1.5);
         let fine = &self.surface.fine;
         let distance = |p: &Vec3| {
-            let Some((j, d)) = grid.nearest(&at, p) else { return 0.0 };
+            let Some((j, d)) = grid.nearest(&at, p) else {
+                return 0.0;
+            };
             fine.ring(j)
                 .flat_map(|h| {
                     let [a, b, c, d] = fine.quads[(h / 4) as usize].map(|v| at[v as usize]);
@@ -166,7 +213,13 @@ impl<'a> Solver<'a> {
                 .map(|t| distance_to_triangle(p, &t))
                 .fold(d, f64::min)
         };
-        let distances: Vec<f64> = self.iso.points.par_iter().with_min_len(512).map(distance).collect();
+        let distances: Vec<f64> = self
+            .iso
+            .points
+            .par_iter()
+            .with_min_len(512)
+            .map(distance)
+            .collect();
         self.summary(distances.into_iter().map(|d| (d, 1.0)).collect())
     }
 

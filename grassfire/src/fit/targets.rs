@@ -21,7 +21,11 @@ pub(super) fn value_and_gradient(field: &VoxelGrid<f32>, p: &Vec3) -> (f64, Vec3
 
 /// Moves `p` to f = 0 by clamped Newton steps along the gradient, and the outward normal there.
 pub(super) fn flow_to_surface(field: &VoxelGrid<f32>, p: &Vec3, steps: u32) -> (Vec3, Vec3) {
-    let top = Vec3::new(field.dims[0] as f64, field.dims[1] as f64, field.dims[2] as f64) - Vec3::repeat(1.0);
+    let top = Vec3::new(
+        field.dims[0] as f64,
+        field.dims[1] as f64,
+        field.dims[2] as f64,
+    ) - Vec3::repeat(1.0);
     let mut at = *p;
     for _ in 0..steps {
         let (value, gradient) = value_and_gradient(field, &at);
@@ -35,7 +39,10 @@ pub(super) fn flow_to_surface(field: &VoxelGrid<f32>, p: &Vec3, steps: u32) -> (
         }
     }
     let (_, gradient) = value_and_gradient(field, &at);
-    (at, (-gradient).try_normalize(1e-9).unwrap_or_else(Vec3::zeros))
+    (
+        at,
+        (-gradient).try_normalize(1e-9).unwrap_or_else(Vec3::zeros),
+    )
 }
 
 /// One point a cell that f = 0 passes (mean of the crossings of its edges), thinned to about `limit`.
@@ -54,7 +61,12 @@ pub(super) fn iso_samples(field: &VoxelGrid<f32>, limit: usize) -> Result<IsoSam
     }
     // Thin without the stripes that a fixed stride would leave: keep the lowest hashes.
     if cells.len() > limit {
-        let hash = |i: usize| (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let hash = |i: usize| {
+            (i as u64 + 1)
+                .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+                .rotate_left(29)
+                .wrapping_mul(0xbf58_476d_1ce4_e5b9)
+        };
         let mut order: Vec<usize> = (0..cells.len()).collect();
         order.sort_by_key(|&i| hash(i));
         order.truncate(limit);
@@ -114,7 +126,13 @@ fn cell_fraction(values: &[f64; 8]) -> f64 {
     let mut inside = 0;
     for s in 0..N * N * N {
         let (x, y, z) = (place(s % N), place(s / N % N), place(s / (N * N)));
-        let plane = |c: usize| mix(mix(values[c], values[c + 1], x), mix(values[c + 2], values[c + 3], x), y);
+        let plane = |c: usize| {
+            mix(
+                mix(values[c], values[c + 1], x),
+                mix(values[c + 2], values[c + 3], x),
+                y,
+            )
+        };
         inside += usize::from(mix(plane(0), plane(4), z) > 0.0);
     }
     inside as f64 / (N * N * N) as f64
@@ -122,7 +140,9 @@ fn cell_fraction(values: &[f64; 8]) -> f64 {
 
 /// Field at the corners of a cell; bits 0, 1, 2 of the index are x, y, z.
 fn corner_values(field: &VoxelGrid<f32>, [i, j, k]: [usize; 3]) -> [f64; 8] {
-    std::array::from_fn(|c| f64::from(field.values[field.index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2))]))
+    std::array::from_fn(|c| {
+        f64::from(field.values[field.index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2))])
+    })
 }
 
 /// Points sorted into cubic cells for nearest-point queries.
@@ -138,10 +158,18 @@ impl PointGrid {
     /// Cells of about `cell` edge, larger when the points spread far.
     pub fn new(points: &[Vec3], cell: f64) -> Self {
         let first = points.first().copied().unwrap_or_else(Vec3::zeros);
-        let (lo, hi) = points.iter().fold((first, first), |(lo, hi), p| (lo.inf(p), hi.sup(p)));
+        let (lo, hi) = points
+            .iter()
+            .fold((first, first), |(lo, hi), p| (lo.inf(p), hi.sup(p)));
         let cell = cell.max((hi - lo).max() / 400.0);
         let dims = [0, 1, 2].map(|a| (((hi[a] - lo[a]) / cell) as usize + 1).min(512));
-        let mut grid = Self { lo, cell, dims, offsets: vec![0; dims.iter().product::<usize>() + 1], items: vec![0; points.len()] };
+        let mut grid = Self {
+            lo,
+            cell,
+            dims,
+            offsets: vec![0; dims.iter().product::<usize>() + 1],
+            items: vec![0; points.len()],
+        };
         let cells: Vec<usize> = points.iter().map(|p| grid.index(grid.cell_of(p))).collect();
         cells.iter().for_each(|&c| grid.offsets[c + 1] += 1);
         for c in 1..grid.offsets.len() {
@@ -156,7 +184,8 @@ impl PointGrid {
     }
 
     fn cell_of(&self, p: &Vec3) -> [usize; 3] {
-        [0, 1, 2].map(|a| (((p[a] - self.lo[a]) / self.cell).max(0.0) as usize).min(self.dims[a] - 1))
+        [0, 1, 2]
+            .map(|a| (((p[a] - self.lo[a]) / self.cell).max(0.0) as usize).min(self.dims[a] - 1))
     }
 
     fn index(&self, c: [usize; 3]) -> usize {
@@ -246,7 +275,10 @@ mod tests {
         for i in 500..700 {
             let p = 1.5 * point(i) - Vec3::repeat(2.0);
             let (_, d) = grid.nearest(&points, &p).expect("points");
-            let least = points.iter().map(|q| (q - p).norm()).fold(f64::INFINITY, f64::min);
+            let least = points
+                .iter()
+                .map(|q| (q - p).norm())
+                .fold(f64::INFINITY, f64::min);
             assert!((d - least).abs() < 1e-12);
         }
     }

@@ -12,11 +12,14 @@ use crate::monitor::Monitor;
 /// Step 3 of [`super::fit`].
 ///
 /// 1. Unfold: around the offending quads fairness grows and data counts less, until nothing
-///    intersects. This may thin necks.
+///    intersects. This may thin necks, so it stops when much volume is gone.
 /// 2. Regrow: with all data back, rounds whose steps are shortened wherever they would create an
 ///    intersection.
-/// 3. Guard: keep the result only if volume and accuracy stayed within the limits; else the fit as
-///    it was, its places reported.
+/// 3. Guard: keep the result only if fewer places are left and volume and accuracy stayed within the
+///    limits.
+/// 4. If places are left: the same from the thin start of the fit, its own few intersections smoothed
+///    away first. Slower, but nothing can fold on the way up.
+/// 5. What still intersects is reported.
 pub(super) fn untangle(
     solver: &mut Solver,
     points: &mut Vec<Vec3>,
@@ -30,21 +33,78 @@ pub(super) fn untangle(
         fitted.self_intersections = before.places(solver);
         return Ok(());
     }
-    let (rms, volume) = (solver.body_to_iso(points).rms, solver.surface.volume(points));
-    let mut trial = points.clone();
-    let mut left = unfold(solver, &mut trial, before.clone(), fitted, options, monitor)?;
-    left = regrow(solver, &mut trial, left, fitted, options, monitor)?;
-    let after = state(solver, &trial, &left);
-    let passes = after.rms <= rms * (1.0 + options.max_rms_growth)
-        && after.volume >= volume * (1.0 - options.max_volume_loss)
-        && left.pairs.len() < before.pairs.len();
-    if passes {
-        *points = trial;
-        fitted.self_intersections = left.places(solver);
-    } else {
-        fitted.self_intersections = before.places(solver);
+    let reference = state(solver, points, &before);
+    let mut left = before.clone();
+    for way in [Way::Unfold, Way::Restart] {
+        let first = fitted.untangle_rounds.len();
+        let mut trial = points.clone();
+        let start = match way {
+            Way::Unfold => unfold(solver, &mut trial, before.clone(), fitted, options, monitor)?,
+            Way::Restart => restart(solver, &mut trial, fitted, monitor)?,
+        };
+        let after = regrow(solver, &mut trial, start, way, fitted, options, monitor)?;
+        let now = state(solver, &trial, &after);
+        let passes = now.rms <= reference.rms * (1.0 + options.max_rms_growth)
+            && now.volume
+                >= reference.volume.min(fitted.iso_volume) * (1.0 - options.max_volume_loss)
+            && after.pairs.len() < left.pairs.len();
+        if passes {
+            fitted
+                .untangle_rounds
+                .iter_mut()
+                .take(first)
+                .for_each(|r| r.accepted = false);
+            fitted
+                .untangle_rounds
+                .iter_mut()
+                .skip(first)
+                .for_each(|r| r.accepted = true);
+            left = after;
+            *points = trial;
+        }
+        if left.pairs.is_empty() {
+            break;
+        }
     }
+    fitted.self_intersections = left.places(solver);
     Ok(())
+}
+
+/// Where regrowth starts from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    /// The fit, unfolded.
+    Unfold,
+    /// The thickened body, calmed.
+    Restart,
+}
+
+/// The start of the fit with its own self-intersections smoothed away: nothing is thick there yet,
+/// so little stands in the way.
+fn restart(
+    solver: &mut Solver,
+    points: &mut Vec<Vec3>,
+    fitted: &mut Fitted,
+    monitor: &Monitor,
+) -> Result<Tangles, FitError> {
+    *points = solver.surface.damped_start()?;
+    let mut found = Tangles::of(solver, points);
+    let mut best = (found.clone(), points.clone());
+    for round in 0..12 {
+        if found.pairs.is_empty() {
+            break;
+        }
+        monitor.check()?;
+        let near = found.control_points(solver, 1 + round / 4);
+        *points = solver.smooth(points, &near)?;
+        found = Tangles::of(solver, points);
+        fitted.untangle_rounds.push(state(solver, points, &found));
+        if found.pairs.len() < best.0.pairs.len() {
+            best = (found.clone(), points.clone());
+        }
+    }
+    *points = best.1;
+    Ok(best.0)
 }
 
 fn state(solver: &Solver, points: &[Vec3], tangles: &Tangles) -> UntangleRound {
@@ -52,7 +112,7 @@ fn state(solver: &Solver, points: &[Vec3], tangles: &Tangles) -> UntangleRound {
         pairs: tangles.pairs.len() as u32,
         rms: solver.body_to_iso(points).rms,
         volume: solver.surface.volume(points),
-        accepted: true,
+        accepted: false,
     }
 }
 
@@ -65,18 +125,31 @@ fn unfold(
     monitor: &Monitor,
 ) -> Result<Tangles, FitError> {
     let mut best = (found.clone(), points.clone());
+    let volume = solver.surface.volume(points);
     for round in 0..options.untangle_rounds {
         if found.pairs.is_empty() {
             break;
         }
-        monitor.step(STAGE, "untangling", 0.65 + 0.15 * f64::from(round) / f64::from(options.untangle_rounds))?;
+        monitor.step(
+            STAGE,
+            "untangling",
+            0.65 + 0.15 * f64::from(round) / f64::from(options.untangle_rounds),
+        )?;
         let near = found.control_points(solver, 1);
-        for (factor, _) in solver.fairness.iter_mut().zip(&near).filter(|(_, near)| **near) {
+        for (factor, _) in solver
+            .fairness
+            .iter_mut()
+            .zip(&near)
+            .filter(|(_, near)| **near)
+        {
             *factor = (*factor * 6.0).min(2000.0);
         }
         for j in 0..solver.trust.len() {
             let (indices, weights) = solver.surface.samples.row(j);
-            let inside = indices.iter().zip(weights).filter(|(p, _)| near[**p as usize]);
+            let inside = indices
+                .iter()
+                .zip(weights)
+                .filter(|(p, _)| near[**p as usize]);
             let share: f64 = inside.map(|x| x.1).sum();
             solver.trust[j] *= 1.0 - 0.6 * share.clamp(0.0, 1.0);
         }
@@ -84,9 +157,13 @@ fn unfold(
             solver.round(points, options.rounds + 2 * round + k)?;
         }
         found = Tangles::of(solver, points);
-        fitted.untangle_rounds.push(state(solver, points, &found));
+        let now = state(solver, points, &found);
+        fitted.untangle_rounds.push(now);
         if found.pairs.len() < best.0.pairs.len() {
             best = (found.clone(), points.clone());
+        }
+        if now.volume < 0.9 * volume {
+            break;
         }
     }
     *points = best.1;
@@ -98,37 +175,75 @@ fn regrow(
     solver: &mut Solver,
     points: &mut Vec<Vec3>,
     mut found: Tangles,
+    way: Way,
     fitted: &mut Fitted,
     options: &FitOptions,
     monitor: &Monitor,
 ) -> Result<Tangles, FitError> {
+    let (first, rounds) = match way {
+        Way::Unfold => (options.rounds, options.regrow_rounds),
+        Way::Restart => (2, options.rounds + options.regrow_rounds),
+    };
+    let (mut rms, mut settled) = (f64::INFINITY, 0);
     solver.trust.fill(1.0);
     solver.fairness.fill(1.0);
-    for round in 0..options.regrow_rounds {
-        monitor.step(STAGE, "regrowing", 0.8 + 0.15 * f64::from(round) / f64::from(options.regrow_rounds))?;
+    for round in 0..rounds {
+        monitor.step(
+            STAGE,
+            "regrowing",
+            0.8 + 0.15 * f64::from(round) / f64::from(rounds),
+        )?;
         let mut wanted = points.clone();
-        solver.round(&mut wanted, options.rounds + round)?;
+        solver.round(&mut wanted, first + round)?;
         let mut share = vec![1.0; points.len()];
         let mut accepted = None;
-        for attempt in 0..8 {
-            let trial: Vec<Vec3> =
-                points.iter().zip(&wanted).zip(&share).map(|((p, w), s)| p + *s * (w - p)).collect();
-            let tangles = Tangles::of(solver, &trial);
-            if tangles.pairs.len() <= found.pairs.len() {
-                accepted = Some((trial, tangles));
+        let mut last = found.clone();
+        for attempt in 0..10 {
+            let trial: Vec<Vec3> = points
+                .iter()
+                .zip(&wanted)
+                .zip(&share)
+                .map(|((p, w), s)| p + *s * (w - p))
+                .collect();
+            last = Tangles::of(solver, &trial);
+            if last.pairs.len() <= found.pairs.len() {
+                accepted = Some(trial);
                 break;
             }
-            for (ring, factor) in [(0, 0.5), (1 + attempt / 3, 0.7)] {
-                let near = tangles.control_points(solver, ring);
+            let outer = 1 + attempt / 3;
+            for (ring, factor) in [(0, 0.5), (outer, 0.7)] {
+                let near = last.control_points(solver, ring);
                 for (s, _) in share.iter_mut().zip(&near).filter(|(_, near)| **near) {
-                    *s = if attempt > 5 { 0.0 } else { *s * factor };
+                    *s = if attempt > 4 { 0.0 } else { *s * factor };
+                }
+            }
+            if attempt == 1 {
+                let near = last.control_points(solver, 1);
+                for (f, _) in solver
+                    .fairness
+                    .iter_mut()
+                    .zip(&near)
+                    .filter(|(_, near)| **near)
+                {
+                    *f = (*f * 2.0).min(200.0);
                 }
             }
         }
-        let Some((trial, tangles)) = accepted else { break };
+        let Some(trial) = accepted else { continue };
+        let tangles = last;
         *points = trial;
         found = tangles;
-        fitted.untangle_rounds.push(state(solver, points, &found));
+        let now = state(solver, points, &found);
+        fitted.untangle_rounds.push(now);
+        settled = if now.rms > 0.995 * rms {
+            settled + 1
+        } else {
+            0
+        };
+        rms = now.rms;
+        if settled == 3 {
+            break;
+        }
     }
     Ok(found)
 }
@@ -147,7 +262,11 @@ impl Tangles {
         let surface = solver.surface;
         let mesh = surface.triangle_mesh(surface.samples.apply(points));
         let pairs = self_intersections(&mesh);
-        let mut quads: Vec<u32> = pairs.iter().flatten().map(|&t| surface.owner[t as usize]).collect();
+        let mut quads: Vec<u32> = pairs
+            .iter()
+            .flatten()
+            .map(|&t| surface.owner[t as usize])
+            .collect();
         quads.sort_unstable();
         quads.dedup();
         Self { mesh, pairs, quads }
@@ -158,7 +277,9 @@ impl Tangles {
         let coarse = &solver.surface.coarse;
         let mut near = vec![false; coarse.point_count];
         for &q in &self.quads {
-            coarse.quads[q as usize].iter().for_each(|&v| near[v as usize] = true);
+            coarse.quads[q as usize]
+                .iter()
+                .for_each(|&v| near[v as usize] = true);
         }
         for _ in 0..rings {
             let inner = near.clone();
@@ -188,7 +309,9 @@ impl Tangles {
         };
         let first = |q: u32| surface.coarse.quads[q as usize][0];
         for &q in &self.quads {
-            surface.coarse.quads[q as usize].iter().for_each(|&v| unite(first(q), v));
+            surface.coarse.quads[q as usize]
+                .iter()
+                .for_each(|&v| unite(first(q), v));
         }
         for pair in &self.pairs {
             let [a, b] = pair.map(|t| surface.owner[t as usize]);
@@ -196,7 +319,11 @@ impl Tangles {
         }
         let mut groups: BTreeMap<usize, (Vec<u32>, Vec3, f64)> = BTreeMap::new();
         for &q in &self.quads {
-            groups.entry(root(&mut parent, first(q) as usize)).or_default().0.push(q);
+            groups
+                .entry(root(&mut parent, first(q) as usize))
+                .or_default()
+                .0
+                .push(q);
         }
         for &t in self.pairs.iter().flatten() {
             let key = root(&mut parent, first(surface.owner[t as usize]) as usize);
@@ -206,7 +333,10 @@ impl Tangles {
         }
         groups
             .into_values()
-            .map(|(quads, sum, count)| SelfIntersectionPlace { place: surface.to_mm(&(sum / count.max(1.0))), quads })
+            .map(|(quads, sum, count)| SelfIntersectionPlace {
+                place: surface.to_mm(&(sum / count.max(1.0))),
+                quads,
+            })
             .collect()
     }
 }

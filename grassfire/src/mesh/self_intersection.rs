@@ -25,14 +25,19 @@ const FOLDED: f64 = 0.999_961_923;
 pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
     let n = mesh.points.len();
     let usable = |t: &[u32; 3]| {
-        t.iter().all(|&v| (v as usize) < n && mesh.points[v as usize].iter().all(|x| x.is_finite()))
+        t.iter()
+            .all(|&v| (v as usize) < n && mesh.points[v as usize].iter().all(|x| x.is_finite()))
             && t[0] != t[1]
             && t[1] != t[2]
             && t[2] != t[0]
     };
-    let ids: Vec<u32> =
-        (0..mesh.triangles.len() as u32).filter(|&t| usable(&mesh.triangles[t as usize])).collect();
-    let boxes: Vec<Aabb> = ids.iter().map(|&t| Aabb::around(&mesh.corners(t as usize))).collect();
+    let ids: Vec<u32> = (0..mesh.triangles.len() as u32)
+        .filter(|&t| usable(&mesh.triangles[t as usize]))
+        .collect();
+    let boxes: Vec<Aabb> = ids
+        .iter()
+        .map(|&t| Aabb::around(&mesh.corners(t as usize)))
+        .collect();
     let tree = Tree::new(&boxes);
     let found: Vec<Vec<[u32; 2]>> = (0..ids.len())
         .into_par_iter()
@@ -60,12 +65,21 @@ struct Aabb {
 
 impl Aabb {
     fn around(points: &[Vec3]) -> Self {
-        let empty = Self { lo: Vec3::repeat(f64::INFINITY), hi: Vec3::repeat(f64::NEG_INFINITY) };
-        points.iter().fold(empty, |b, p| Self { lo: b.lo.inf(p), hi: b.hi.sup(p) })
+        let empty = Self {
+            lo: Vec3::repeat(f64::INFINITY),
+            hi: Vec3::repeat(f64::NEG_INFINITY),
+        };
+        points.iter().fold(empty, |b, p| Self {
+            lo: b.lo.inf(p),
+            hi: b.hi.sup(p),
+        })
     }
 
     fn join(&self, other: &Self) -> Self {
-        Self { lo: self.lo.inf(&other.lo), hi: self.hi.sup(&other.hi) }
+        Self {
+            lo: self.lo.inf(&other.lo),
+            hi: self.hi.sup(&other.hi),
+        }
     }
 
     fn overlaps(&self, other: &Self) -> bool {
@@ -84,7 +98,10 @@ struct Tree {
 
 impl Tree {
     fn new(boxes: &[Aabb]) -> Self {
-        let mut tree = Self { nodes: Vec::new(), items: (0..boxes.len() as u32).collect() };
+        let mut tree = Self {
+            nodes: Vec::new(),
+            items: (0..boxes.len() as u32).collect(),
+        };
         if !boxes.is_empty() {
             let mut items = std::mem::take(&mut tree.items);
             tree.build(boxes, &mut items, 0);
@@ -94,7 +111,10 @@ impl Tree {
     }
 
     fn build(&mut self, boxes: &[Aabb], items: &mut [u32], first: u32) {
-        let around = items.iter().skip(1).fold(boxes[items[0] as usize], |b, &i| b.join(&boxes[i as usize]));
+        let around = items
+            .iter()
+            .skip(1)
+            .fold(boxes[items[0] as usize], |b, &i| b.join(&boxes[i as usize]));
         let here = self.nodes.len();
         self.nodes.push((around, first, items.len() as u32, 0));
         if items.len() <= LEAF {
@@ -115,7 +135,9 @@ impl Tree {
     fn overlapping(&self, boxes: &[Aabb], query: &Aabb, mut visit: impl FnMut(u32)) {
         let mut stack = vec![0u32];
         while let Some(at) = stack.pop() {
-            let Some((around, first, count, right)) = self.nodes.get(at as usize) else { continue };
+            let Some((around, first, count, right)) = self.nodes.get(at as usize) else {
+                continue;
+            };
             if !around.overlaps(query) {
                 continue;
             }
@@ -134,7 +156,11 @@ impl Tree {
 }
 
 fn coord(p: &Vec3) -> Coord3D<f64> {
-    Coord3D { x: p.x, y: p.y, z: p.z }
+    Coord3D {
+        x: p.x,
+        y: p.y,
+        z: p.z,
+    }
 }
 
 fn side(t: &[Vec3; 3], p: &Vec3) -> f64 {
@@ -157,9 +183,9 @@ fn intersect(mesh: &TriMesh, i: usize, j: usize) -> bool {
     let (a, b) = (mesh.corners(i), mesh.corners(j));
     let mut shared = [(0, 0); 9];
     let mut count = 0;
-    for k in 0..3 {
-        for m in 0..3 {
-            if ti[k] == tj[m] {
+    for (k, v) in ti.iter().enumerate() {
+        for (m, w) in tj.iter().enumerate() {
+            if v == w {
                 shared[count] = (k, m);
                 count += 1;
             }
@@ -167,11 +193,13 @@ fn intersect(mesh: &TriMesh, i: usize, j: usize) -> bool {
     }
     match shared[..count] {
         [] => {
-            let edge = |t: &[Vec3; 3], k: usize, other: &[Vec3; 3]| crosses(&t[k], &t[(k + 1) % 3], other);
+            let edge =
+                |t: &[Vec3; 3], k: usize, other: &[Vec3; 3]| crosses(&t[k], &t[(k + 1) % 3], other);
             (0..3).any(|k| edge(&a, k, &b) || edge(&b, k, &a)) || coplanar_overlap(&a, &b)
         }
         [(k, m)] => {
-            crosses(&a[(k + 1) % 3], &a[(k + 2) % 3], &b) || crosses(&b[(m + 1) % 3], &b[(m + 2) % 3], &a)
+            crosses(&a[(k + 1) % 3], &a[(k + 2) % 3], &b)
+                || crosses(&b[(m + 1) % 3], &b[(m + 2) % 3], &a)
         }
         [(k, m), (l, n)] => folded(&a, 3 - k - l, &b, 3 - m - n),
         _ => true,
@@ -181,7 +209,9 @@ fn intersect(mesh: &TriMesh, i: usize, j: usize) -> bool {
 /// Triangles over a common edge, `k` and `m` their third corners, lie on top of each other.
 fn folded(a: &[Vec3; 3], k: usize, b: &[Vec3; 3], m: usize) -> bool {
     let (from, to) = (a[(k + 1) % 3], a[(k + 2) % 3]);
-    let Some(axis) = (to - from).try_normalize(0.0) else { return false };
+    let Some(axis) = (to - from).try_normalize(0.0) else {
+        return false;
+    };
     let across = |p: &Vec3| {
         let d = p - from;
         (d - axis * d.dot(&axis)).try_normalize(0.0)
@@ -199,13 +229,22 @@ fn coplanar_overlap(a: &[Vec3; 3], b: &[Vec3; 3]) -> bool {
     }
     let normal = (a[1] - a[0]).cross(&(a[2] - a[0]));
     let drop = normal.iamax();
-    let flat = |p: &Vec3| Coord { x: p[(drop + 1) % 3], y: p[(drop + 2) % 3] };
+    let flat = |p: &Vec3| Coord {
+        x: p[(drop + 1) % 3],
+        y: p[(drop + 2) % 3],
+    };
     let (a, b) = (a.map(|p| flat(&p)), b.map(|p| flat(&p)));
     let apart = |s: &[Coord<f64>; 3], t: &[Coord<f64>; 3]| {
         let sense = orient2d(s[0], s[1], s[2]);
-        (0..3).any(|k| t.iter().all(|&p| orient2d(s[k], s[(k + 1) % 3], p) * sense < 0.0))
+        (0..3).any(|k| {
+            t.iter()
+                .all(|&p| orient2d(s[k], s[(k + 1) % 3], p) * sense < 0.0)
+        })
     };
-    orient2d(a[0], a[1], a[2]) != 0.0 && orient2d(b[0], b[1], b[2]) != 0.0 && !apart(&a, &b) && !apart(&b, &a)
+    orient2d(a[0], a[1], a[2]) != 0.0
+        && orient2d(b[0], b[1], b[2]) != 0.0
+        && !apart(&a, &b)
+        && !apart(&b, &a)
 }
 
 #[cfg(test)]
@@ -214,7 +253,11 @@ mod tests {
 
     fn mesh(points: &[[f64; 3]], triangles: &[[u32; 3]]) -> TriMesh {
         let points = points.iter().map(|p| Vec3::from(*p)).collect();
-        TriMesh { points, triangles: triangles.to_vec(), tags: Vec::new() }
+        TriMesh {
+            points,
+            triangles: triangles.to_vec(),
+            tags: Vec::new(),
+        }
     }
 
     #[test]
@@ -230,17 +273,43 @@ mod tests {
 
     #[test]
     fn neighbours_count_only_when_they_cut_or_fold() {
-        let points = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [1., 1., 0.2], [0.2, 0.5, 0.0]];
+        let points = [
+            [0., 0., 0.],
+            [1., 0., 0.],
+            [0., 1., 0.],
+            [1., 1., 0.2],
+            [0.2, 0.5, 0.0],
+        ];
         assert!(self_intersections(&mesh(&points, &[[0, 1, 2], [1, 3, 2]])).is_empty());
-        assert_eq!(self_intersections(&mesh(&points, &[[0, 1, 2], [2, 1, 4]])), [[0, 1]]);
-        let fan = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0.4, 0.4, -1.], [0.4, 0.4, 1.]];
-        assert_eq!(self_intersections(&mesh(&fan, &[[0, 1, 2], [0, 3, 4]])), [[0, 1]]);
+        assert_eq!(
+            self_intersections(&mesh(&points, &[[0, 1, 2], [2, 1, 4]])),
+            [[0, 1]]
+        );
+        let fan = [
+            [0., 0., 0.],
+            [1., 0., 0.],
+            [0., 1., 0.],
+            [0.4, 0.4, -1.],
+            [0.4, 0.4, 1.],
+        ];
+        assert_eq!(
+            self_intersections(&mesh(&fan, &[[0, 1, 2], [0, 3, 4]])),
+            [[0, 1]]
+        );
     }
 
     #[test]
     fn coplanar_overlap_is_found() {
-        let points =
-            [[0., 0., 1.], [2., 0., 1.], [0., 2., 1.], [0.5, 0.5, 1.], [3., 0.5, 1.], [3., 3., 1.], [9., 0.5, 1.], [9., 3., 1.]];
+        let points = [
+            [0., 0., 1.],
+            [2., 0., 1.],
+            [0., 2., 1.],
+            [0.5, 0.5, 1.],
+            [3., 0.5, 1.],
+            [3., 3., 1.],
+            [9., 0.5, 1.],
+            [9., 3., 1.],
+        ];
         let found = self_intersections(&mesh(&points, &[[0, 1, 2], [3, 4, 5], [4, 6, 7]]));
         assert_eq!(found, [[0, 1]]);
     }
@@ -255,7 +324,11 @@ mod tests {
                 for i in 0..12u32 {
                     let (x, y) = (f64::from(i), f64::from(j) + 0.137);
                     let z = 0.3 * (x * 0.9).sin() + 0.21 * (y * 1.3).cos();
-                    points.push(if sheet == 0 { Vec3::new(x, y, z) } else { Vec3::new(x + 0.31, z + 5.0, y - 6.0) });
+                    points.push(if sheet == 0 {
+                        Vec3::new(x, y, z)
+                    } else {
+                        Vec3::new(x + 0.31, z + 5.0, y - 6.0)
+                    });
                     if i > 0 && j > 0 {
                         let v = base + 12 * j + i;
                         triangles.extend([[v, v - 1, v - 13], [v, v - 13, v - 12]]);
@@ -263,7 +336,11 @@ mod tests {
                 }
             }
         }
-        let mesh = TriMesh { points, triangles, tags: Vec::new() };
+        let mesh = TriMesh {
+            points,
+            triangles,
+            tags: Vec::new(),
+        };
         let all: Vec<[u32; 2]> = (0..mesh.triangles.len())
             .flat_map(|i| (i + 1..mesh.triangles.len()).map(move |j| [i, j]))
             .filter(|&[i, j]| intersect(&mesh, i, j))

@@ -95,7 +95,7 @@ impl Stencils {
     }
 
     /// Appends a row; entries on the same point are added in the given order.
-    pub fn push(&mut self, entries: &mut Vec<(u32, f64)>) {
+    pub fn push(&mut self, entries: &mut [(u32, f64)]) {
         entries.sort_by_key(|e| e.0);
         let start = self.indices.len();
         for &(index, weight) in entries.iter() {
@@ -113,7 +113,9 @@ impl Stencils {
 
     /// The weighted sums of `points`, one a row.
     pub fn apply(&self, points: &[Vec3]) -> Vec<Vec3> {
-        (0..self.rows()).map(|r| self.apply_row(r, points)).collect()
+        (0..self.rows())
+            .map(|r| self.apply_row(r, points))
+            .collect()
     }
 
     /// The weighted sum of row `r`.
@@ -183,7 +185,10 @@ impl QuadTopology {
     pub fn new(point_count: usize, quads: &[[u32; 4]]) -> Result<Self, CatmullClarkError> {
         let count = point_count.saturating_add(quads.len().saturating_mul(3));
         if count > LARGEST {
-            return Err(CatmullClarkError::TooLarge { count, limit: LARGEST });
+            return Err(CatmullClarkError::TooLarge {
+                count,
+                limit: LARGEST,
+            });
         }
         let bad = |q: &[u32; 4]| {
             (0..4).any(|k| q[k] as usize >= point_count || q[k + 1..].contains(&q[k]))
@@ -291,9 +296,9 @@ impl QuadTopology {
         let quad_point = |q: usize| (self.point_count + edges.len() + q) as u32;
         let mut quads = Vec::with_capacity(4 * self.quads.len());
         for (q, quad) in self.quads.iter().enumerate() {
-            for k in 0..4 {
+            for (k, &v) in quad.iter().enumerate() {
                 let before = 4 * q + (k + 3) % 4;
-                quads.push([quad[k], edge_point(4 * q + k), quad_point(q), edge_point(before)]);
+                quads.push([v, edge_point(4 * q + k), quad_point(q), edge_point(before)]);
             }
         }
         let refined = QuadTopology::new(split.rows(), &quads)?;
@@ -440,7 +445,10 @@ pub fn limit_operator(
 ///
 /// # Errors
 /// As [`QuadTopology::new`].
-pub fn limit_mesh(mesh: &ControlMesh, levels: u32) -> Result<(TriMesh, Vec<u32>), CatmullClarkError> {
+pub fn limit_mesh(
+    mesh: &ControlMesh,
+    levels: u32,
+) -> Result<(TriMesh, Vec<u32>), CatmullClarkError> {
     let mut topology = QuadTopology::new(mesh.points.len(), &mesh.quads)?;
     let mut points = mesh.points.clone();
     for _ in 0..levels {
@@ -450,7 +458,14 @@ pub fn limit_mesh(mesh: &ControlMesh, levels: u32) -> Result<(TriMesh, Vec<u32>)
     }
     let points = topology.limit_positions().apply(&points);
     let (triangles, owner) = triangles_of(&topology.quads, levels);
-    Ok((TriMesh { points, triangles, tags: Vec::new() }, owner))
+    Ok((
+        TriMesh {
+            points,
+            triangles,
+            tags: Vec::new(),
+        },
+        owner,
+    ))
 }
 
 /// Two triangles a refined quad, and the control quad that each belongs to.
@@ -519,7 +534,10 @@ mod tests {
         let normals = |t: &QuadTopology, x: &[Vec3]| -> Vec<Vec3> {
             let [u, v] = t.limit_tangents();
             let (u, v) = (u.apply(x), v.apply(x));
-            u.iter().zip(&v).map(|(u, v)| u.cross(v).normalize()).collect()
+            u.iter()
+                .zip(&v)
+                .map(|(u, v)| u.cross(v).normalize())
+                .collect()
         };
         let a = normals(&topology, &cube.points);
         let b = normals(&refined, &split.apply(&cube.points));
@@ -542,9 +560,15 @@ mod tests {
     fn bad_meshes_are_refused_by_name() {
         let mut open = cube();
         open.quads.pop();
-        assert!(matches!(limit_mesh(&open, 1), Err(CatmullClarkError::BadEdge { .. })));
+        assert!(matches!(
+            limit_mesh(&open, 1),
+            Err(CatmullClarkError::BadEdge { .. })
+        ));
         let mut degenerate = cube();
         degenerate.quads[2][1] = degenerate.quads[2][0];
-        assert_eq!(limit_mesh(&degenerate, 1), Err(CatmullClarkError::BadQuad { quad: 2 }));
+        assert_eq!(
+            limit_mesh(&degenerate, 1),
+            Err(CatmullClarkError::BadQuad { quad: 2 })
+        );
     }
 }

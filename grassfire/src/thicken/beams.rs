@@ -41,7 +41,9 @@ fn chains(complex: &Complex, draft: &Draft) -> Vec<Vec<u32>> {
             if !plain(here) || Some(here) == stop {
                 return path;
             }
-            let next = complex.beam_neighbours[here as usize].iter().find(|&&w| w != from);
+            let next = complex.beam_neighbours[here as usize]
+                .iter()
+                .find(|&&w| w != from);
             path.extend(next);
         }
     };
@@ -106,7 +108,9 @@ fn plug(v: u32, at: &Vec3, direction: &Vec3, draft: &mut Draft) -> Option<[u32; 
     let mut best: Option<(f64, u32)> = None;
     for &p in &draft.vertex_points[v as usize] {
         for &id in &draft.point_quads[p as usize] {
-            let Some(quad) = draft.quads[id as usize] else { continue };
+            let Some(quad) = draft.quads[id as usize] else {
+                continue;
+            };
             let [a, b, c, d] = quad.map(|i| draft.points[i as usize]);
             let normal = unit((c - a).cross(&(d - b)));
             let toward = unit((a + b + c + d) / 4.0 - at);
@@ -121,9 +125,16 @@ fn plug(v: u32, at: &Vec3, direction: &Vec3, draft: &mut Draft) -> Option<[u32; 
 
 /// Unit tangents of a path; of a closed one (`looped`) the first equals the last.
 fn tangents(complex: &Complex, path: &[u32], looped: bool) -> Vec<Vec3> {
-    let steps: Vec<Vec3> = path.windows(2).map(|w| unit(complex.at(w[1]) - complex.at(w[0]))).collect();
+    let steps: Vec<Vec3> = path
+        .windows(2)
+        .map(|w| unit(complex.at(w[1]) - complex.at(w[0])))
+        .collect();
     let count = steps.len();
-    let mean = |a: &Vec3, b: &Vec3| (a + b).try_normalize(1e-6).unwrap_or_else(|| perpendicular(a));
+    let mean = |a: &Vec3, b: &Vec3| {
+        (a + b)
+            .try_normalize(1e-6)
+            .unwrap_or_else(|| perpendicular(a))
+    };
     (0..=count)
         .map(|k| match k {
             0 if looped => mean(&steps[count - 1], &steps[0]),
@@ -137,7 +148,9 @@ fn tangents(complex: &Complex, path: &[u32], looped: bool) -> Vec<Vec3> {
 
 /// The part of `u` across the unit vector `tangent`, or any direction across.
 fn across(u: &Vec3, tangent: &Vec3) -> Vec3 {
-    (u - tangent * u.dot(tangent)).try_normalize(1e-6).unwrap_or_else(|| perpendicular(tangent))
+    (u - tangent * u.dot(tangent))
+        .try_normalize(1e-6)
+        .unwrap_or_else(|| perpendicular(tangent))
 }
 
 /// First frame directions transported along the path without twist (double reflection is not needed
@@ -151,7 +164,14 @@ fn transport(first: Vec3, tangents: &[Vec3]) -> Vec<Vec3> {
 }
 
 /// Four points around vertex `v`, counter-clockwise about `tangent`, the first turned by `turn` from `u`.
-fn ring_points(complex: &Complex, v: u32, u: &Vec3, tangent: &Vec3, turn: f64, draft: &mut Draft) -> [u32; 4] {
+fn ring_points(
+    complex: &Complex,
+    v: u32,
+    u: &Vec3,
+    tangent: &Vec3,
+    turn: f64,
+    draft: &mut Draft,
+) -> [u32; 4] {
     let (at, radius) = (complex.at(v), complex.radii[v as usize]);
     let w = tangent.cross(u);
     [0.0, 1.0, 2.0, 3.0].map(|quarter| {
@@ -171,7 +191,9 @@ fn add_tube(complex: &Complex, path: &[u32], start: [u32; 4], end: [u32; 4], dra
     let tangents = tangents(complex, path, false);
     let [a, b, c, d] = end;
     let end = [d, c, b, a];
-    let centre = |s: &[u32; 4], draft: &Draft| s.map(|i| draft.points[i as usize]).iter().sum::<Vec3>() / 4.0;
+    let centre = |s: &[u32; 4], draft: &Draft| {
+        s.map(|i| draft.points[i as usize]).iter().sum::<Vec3>() / 4.0
+    };
     let first = draft.points[start[0] as usize] - centre(&start, draft);
     let frames = transport(first, &tangents);
     // Which corner of the last section follows the first corner of the first one with least twist.
@@ -186,7 +208,9 @@ fn add_tube(complex: &Complex, path: &[u32], start: [u32; 4], end: [u32; 4], dra
         let (x, y) = turns.fold((0.0, 0.0), |(x, y), t| (x + t.cos(), y + t.sin()));
         f64::atan2(y, x)
     };
-    let shift = (0..4).min_by(|&a, &b| twist(a).abs().total_cmp(&twist(b).abs())).unwrap_or(0);
+    let shift = (0..4)
+        .min_by(|&a, &b| twist(a).abs().total_cmp(&twist(b).abs()))
+        .unwrap_or(0);
     let turn = twist(shift);
     let mut before = start;
     for k in 1..last {
@@ -216,5 +240,9 @@ fn add_loop(complex: &Complex, path: &[u32], draft: &mut Draft) {
         before = here;
     }
     let shift = shift.rem_euclid(4.0) as usize;
-    stitch(&before, &[0, 1, 2, 3].map(|j| first[(j + 4 - shift) % 4]), draft);
+    stitch(
+        &before,
+        &[0, 1, 2, 3].map(|j| first[(j + 4 - shift) % 4]),
+        draft,
+    );
 }

@@ -8,8 +8,17 @@ use crate::spline::ControlMesh;
 use crate::spline::catmull_clark::{CatmullClarkError, QuadTopology};
 
 /// Step 7 of [`super::thicken`], packing and checks.
-pub(super) fn finish(complex: &Complex, draft: Draft, mut rules: RuleCounts) -> Result<ThickenedBody, ThickenError> {
-    let Draft { points, vertex, quads, .. } = draft;
+pub(super) fn finish(
+    complex: &Complex,
+    draft: Draft,
+    mut rules: RuleCounts,
+) -> Result<ThickenedBody, ThickenError> {
+    let Draft {
+        points,
+        vertex,
+        quads,
+        ..
+    } = draft;
     let mut quads: Vec<[u32; 4]> = quads.into_iter().flatten().collect();
     rules.doublets = merge_doublets(points.len(), &mut quads);
     // Pack: points in use keep their order.
@@ -19,10 +28,16 @@ pub(super) fn finish(complex: &Complex, draft: Draft, mut rules: RuleCounts) -> 
     for (i, &v) in used.iter().enumerate() {
         number[v] = i as u32;
     }
-    quads.iter_mut().flatten().for_each(|v| *v = number[*v as usize]);
+    quads
+        .iter_mut()
+        .flatten()
+        .for_each(|v| *v = number[*v as usize]);
     let vertex: Vec<u32> = used.iter().map(|&v| vertex[v]).collect();
     let mut body = ThickenedBody {
-        mesh: ControlMesh { points: used.iter().map(|&v| points[v]).collect(), quads },
+        mesh: ControlMesh {
+            points: used.iter().map(|&v| points[v]).collect(),
+            quads,
+        },
         source: vertex.iter().map(|&v| complex.source[v as usize]).collect(),
         foot: vertex.iter().map(|&v| complex.at(v)).collect(),
         bodies: Vec::new(),
@@ -40,7 +55,10 @@ fn merge_doublets(point_count: usize, quads: &mut Vec<[u32; 4]>) -> u32 {
         quad.iter().for_each(|&v| at[v as usize].push(q as u32));
     }
     let mut alive = vec![true; quads.len()];
-    let mut stack: Vec<u32> = (0..point_count as u32).rev().filter(|&v| at[v as usize].len() == 2).collect();
+    let mut stack: Vec<u32> = (0..point_count as u32)
+        .rev()
+        .filter(|&v| at[v as usize].len() == 2)
+        .collect();
     let mut merged = 0;
     while let Some(v) = stack.pop() {
         let [a, b] = at[v as usize][..] else { continue };
@@ -66,8 +84,17 @@ fn merge_doublets(point_count: usize, quads: &mut Vec<[u32; 4]>) -> u32 {
     merged
 }
 
-fn check_surface(body: &ThickenedBody, vertex: &[u32], complex: &Complex) -> Result<QuadTopology, ThickenError> {
-    let place = |p: u32| (complex.source[vertex[p as usize] as usize], body.mesh.points[p as usize]);
+fn check_surface(
+    body: &ThickenedBody,
+    vertex: &[u32],
+    complex: &Complex,
+) -> Result<QuadTopology, ThickenError> {
+    let place = |p: u32| {
+        (
+            complex.source[vertex[p as usize] as usize],
+            body.mesh.points[p as usize],
+        )
+    };
     let bad = |p: u32, what| {
         let (point, place) = place(p);
         ThickenError::BadVertex { point, place, what }
@@ -79,10 +106,16 @@ fn check_surface(body: &ThickenedBody, vertex: &[u32], complex: &Complex) -> Res
             return Err(bad(point, "its quads form more than one fan"));
         }
         Err(CatmullClarkError::BadQuad { quad }) => {
-            return Err(bad(body.mesh.quads[quad as usize][0], "a quad there uses a point twice"));
+            return Err(bad(
+                body.mesh.quads[quad as usize][0],
+                "a quad there uses a point twice",
+            ));
         }
         Err(CatmullClarkError::TooLarge { count, .. }) => {
-            return Err(ThickenError::BadCount { points: count, radii: complex.radii.len() });
+            return Err(ThickenError::BadCount {
+                points: count,
+                radii: complex.radii.len(),
+            });
         }
     };
     match topology.valence.iter().position(|&n| n < 3) {
@@ -101,13 +134,18 @@ fn bad_edges(body: &ThickenedBody, first: [u32; 2]) -> ThickenError {
         }
     }
     uses.sort_unstable();
-    let count_of = |e: &[([u32; 2], bool)], sense: bool| e.iter().filter(|u| u.1 == sense).count() as u32;
+    let count_of =
+        |e: &[([u32; 2], bool)], sense: bool| e.iter().filter(|u| u.1 == sense).count() as u32;
     let wrong = |e: &&[([u32; 2], bool)]| count_of(e, false) != 1 || count_of(e, true) != 1;
     let count = uses.chunk_by(|a, b| a.0 == b.0).filter(wrong).count();
     let here: Vec<([u32; 2], bool)> = uses.iter().filter(|u| u.0 == first).copied().collect();
     ThickenError::NotManifold {
         points: first.map(|p| body.source[p as usize]),
-        place: first.iter().map(|&p| body.mesh.points[p as usize]).sum::<Vec3>() / 2.0,
+        place: first
+            .iter()
+            .map(|&p| body.mesh.points[p as usize])
+            .sum::<Vec3>()
+            / 2.0,
         along: count_of(&here, false),
         against: count_of(&here, true),
         count,
@@ -119,7 +157,11 @@ fn components(complex: &Complex) -> (Vec<u32>, Vec<u32>) {
     let n = complex.points.len();
     let mut parent: Vec<usize> = (0..n).collect();
     let mut used = vec![false; n];
-    let links = complex.edges.iter().map(|e| e.ends).chain(complex.beams.iter().copied());
+    let links = complex
+        .edges
+        .iter()
+        .map(|e| e.ends)
+        .chain(complex.beams.iter().copied());
     for [a, b] in links {
         used[a as usize] = true;
         used[b as usize] = true;
@@ -151,7 +193,12 @@ fn check_bodies(
     for v in component.iter().filter(|c| **c != NONE) {
         bodies[*v as usize].skeleton_chi += 1;
     }
-    for ends in complex.edges.iter().map(|e| e.ends).chain(complex.beams.iter().copied()) {
+    for ends in complex
+        .edges
+        .iter()
+        .map(|e| e.ends)
+        .chain(complex.beams.iter().copied())
+    {
         bodies[component[ends[0] as usize] as usize].skeleton_chi -= 1;
     }
     for quad in &complex.quads {
@@ -168,7 +215,10 @@ fn check_bodies(
         here.quads += 1;
         here.volume += quad_volume(body, q, &complex.at(first[of_point(quad[0])]));
         for &p in quad {
-            let (a, b) = (root(&mut shell, quad[0] as usize), root(&mut shell, p as usize));
+            let (a, b) = (
+                root(&mut shell, quad[0] as usize),
+                root(&mut shell, p as usize),
+            );
             shell[a.max(b)] = a.min(b);
         }
     }
@@ -180,10 +230,19 @@ fn check_bodies(
     for (i, b) in bodies.iter().enumerate() {
         let place = complex.at(first[i]);
         if b.chi != 2 * b.skeleton_chi {
-            return Err(ThickenError::BadTopology { body: i as u32, place, chi: b.chi, wanted: 2 * b.skeleton_chi });
+            return Err(ThickenError::BadTopology {
+                body: i as u32,
+                place,
+                chi: b.chi,
+                wanted: 2 * b.skeleton_chi,
+            });
         }
         if b.volume.is_nan() || b.volume <= 0.0 {
-            return Err(ThickenError::NotPositive { body: i as u32, place, volume: b.volume });
+            return Err(ThickenError::NotPositive {
+                body: i as u32,
+                place,
+                volume: b.volume,
+            });
         }
     }
     Ok(bodies)

@@ -15,12 +15,20 @@ pub(super) fn split_tight_strips(complex: &mut Complex, rules: &mut RuleCounts) 
     let mut strip: Vec<usize> = (0..complex.edges.len()).collect();
     for edges in &complex.quad_edges {
         for k in 0..2 {
-            let (a, b) = (root(&mut strip, edges[k] as usize), root(&mut strip, edges[k + 2] as usize));
+            let (a, b) = (
+                root(&mut strip, edges[k] as usize),
+                root(&mut strip, edges[k + 2] as usize),
+            );
             strip[a.max(b)] = a.min(b);
         }
     }
     let mut split = vec![false; complex.edges.len()];
-    for (e, edge) in complex.edges.iter().enumerate().filter(|(_, edge)| edge.uses.len() > 1) {
+    for (e, edge) in complex
+        .edges
+        .iter()
+        .enumerate()
+        .filter(|(_, edge)| edge.uses.len() > 1)
+    {
         let mut sectors: Vec<[usize; 2]> = around_edge(complex, edge.ends, &edge.uses)
             .iter()
             .map(|&u| sector_slots(complex, edge.ends, u).map(|s| root(&mut class, s)))
@@ -35,7 +43,13 @@ pub(super) fn split_tight_strips(complex: &mut Complex, rules: &mut RuleCounts) 
         return false;
     }
     let middle: Vec<u32> = (0..complex.edges.len())
-        .map(|e| if split[root(&mut strip, e)] { add_between(complex, complex.edges[e].ends) } else { NONE })
+        .map(|e| {
+            if split[root(&mut strip, e)] {
+                add_between(complex, complex.edges[e].ends)
+            } else {
+                NONE
+            }
+        })
         .collect();
     let quads = std::mem::take(&mut complex.quads);
     for (&[a, b, c, d], edges) in quads.iter().zip(&complex.quad_edges.clone()) {
@@ -60,8 +74,12 @@ pub(super) fn split_tight_strips(complex: &mut Complex, rules: &mut RuleCounts) 
 
 fn add_between(complex: &mut Complex, [a, b]: [u32; 2]) -> u32 {
     let (i, j) = (a as usize, b as usize);
-    complex.points.push((complex.points[i] + complex.points[j]) / 2.0);
-    complex.radii.push((complex.radii[i] + complex.radii[j]) / 2.0);
+    complex
+        .points
+        .push((complex.points[i] + complex.points[j]) / 2.0);
+    complex
+        .radii
+        .push((complex.radii[i] + complex.radii[j]) / 2.0);
     complex.source.push(complex.source[i]);
     complex.points.len() as u32 - 1
 }

@@ -88,10 +88,12 @@ fn validate(skeleton: &Skeleton) -> Result<(), ThickenError> {
         return Err(ThickenError::Empty);
     }
     if skeleton.radii.len() != n || n > i32::MAX as usize {
-        return Err(ThickenError::BadCount { points: n, radii: skeleton.radii.len() });
+        return Err(ThickenError::BadCount {
+            points: n,
+            radii: skeleton.radii.len(),
+        });
     }
-    let bad_quad =
-        |q: &[u32; 4]| (0..4).any(|k| q[k] as usize >= n || q[k + 1..].contains(&q[k]));
+    let bad_quad = |q: &[u32; 4]| (0..4).any(|k| q[k] as usize >= n || q[k + 1..].contains(&q[k]));
     if let Some(quad) = skeleton.quads.iter().position(bad_quad) {
         return Err(ThickenError::BadQuad { quad: quad as u32 });
     }
@@ -99,12 +101,23 @@ fn validate(skeleton: &Skeleton) -> Result<(), ThickenError> {
     if let Some(beam) = skeleton.beams.iter().position(bad_beam) {
         return Err(ThickenError::BadBeam { beam: beam as u32 });
     }
-    let used = skeleton.quads.iter().flatten().chain(skeleton.beams.iter().flatten());
+    let used = skeleton
+        .quads
+        .iter()
+        .flatten()
+        .chain(skeleton.beams.iter().flatten());
     for &point in used {
-        let (place, radius) = (skeleton.points[point as usize], skeleton.radii[point as usize]);
+        let (place, radius) = (
+            skeleton.points[point as usize],
+            skeleton.radii[point as usize],
+        );
         let far = place.iter().any(|x| !x.is_finite() || x.abs() > 1e9);
         if far || !(radius > 0.0 && radius < 1e9) {
-            return Err(ThickenError::BadPoint { point, place, radius });
+            return Err(ThickenError::BadPoint {
+                point,
+                place,
+                radius,
+            });
         }
     }
     Ok(())
@@ -129,7 +142,10 @@ impl Complex {
         self.quad_edges = vec![[0; 4]; self.quads.len()];
         for (ends, q, k) in uses {
             if self.edges.last().is_none_or(|e| e.ends != ends) {
-                self.edges.push(Edge { ends, uses: Vec::new() });
+                self.edges.push(Edge {
+                    ends,
+                    uses: Vec::new(),
+                });
             }
             self.quad_edges[q as usize][k as usize] = (self.edges.len() - 1) as u32;
             if let Some(edge) = self.edges.last_mut() {
@@ -140,10 +156,16 @@ impl Complex {
             self.beam_neighbours[a as usize].push(b);
             self.beam_neighbours[b as usize].push(a);
         }
-        self.beam_neighbours.iter_mut().for_each(|list| list.sort_unstable());
+        self.beam_neighbours
+            .iter_mut()
+            .for_each(|list| list.sort_unstable());
         let points = &self.points;
         let corners = |q: &[u32; 4]| q.map(|v| points[v as usize]);
-        self.centres = self.quads.iter().map(|q| corners(q).iter().sum::<Vec3>() / 4.0).collect();
+        self.centres = self
+            .quads
+            .iter()
+            .map(|q| corners(q).iter().sum::<Vec3>() / 4.0)
+            .collect();
         self.normals = self
             .quads
             .iter()
@@ -170,12 +192,16 @@ impl Complex {
     /// Quad `q` runs from the lower to the higher end of edge `e`.
     pub fn runs_along(&self, e: u32, q: u32) -> bool {
         let edge = &self.edges[e as usize];
-        edge.uses.iter().any(|&(i, k)| i == q && self.quads[q as usize][k as usize] == edge.ends[0])
+        edge.uses
+            .iter()
+            .any(|&(i, k)| i == q && self.quads[q as usize][k as usize] == edge.ends[0])
     }
 
     /// Edge with quads between two vertices.
     fn edge_between(&self, a: u32, b: u32) -> Option<usize> {
-        self.edges.binary_search_by_key(&[a.min(b), a.max(b)], |e| e.ends).ok()
+        self.edges
+            .binary_search_by_key(&[a.min(b), a.max(b)], |e| e.ends)
+            .ok()
     }
 
     /// The connected pieces of the quads at `v`, by their lowest quad.
@@ -198,7 +224,11 @@ impl Complex {
             let r = root(&mut piece, i);
             if fan_of[r] == usize::MAX {
                 fan_of[r] = fans.len();
-                fans.push(Fan { corners: Vec::new(), rims: Vec::new(), plain: true });
+                fans.push(Fan {
+                    corners: Vec::new(),
+                    rims: Vec::new(),
+                    plain: true,
+                });
             }
             let fan = &mut fans[fan_of[r]];
             fan.corners.push(corner);
@@ -210,7 +240,8 @@ impl Complex {
                 }
             }
         }
-        fans.iter_mut().for_each(|fan| fan.plain &= fan.rims.len() == 2);
+        fans.iter_mut()
+            .for_each(|fan| fan.plain &= fan.rims.len() == 2);
         fans
     }
 }
@@ -257,7 +288,10 @@ fn drop_doubled_beams(complex: &mut Complex, monitor: &Monitor) {
             kept.push([a, b]);
             continue;
         };
-        let text = format!("beam {i} at ({:.2}, {:.2}, {:.2}) {why}: dropped", place.x, place.y, place.z);
+        let text = format!(
+            "beam {i} at ({:.2}, {:.2}, {:.2}) {why}: dropped",
+            place.x, place.y, place.z
+        );
         monitor.warn(STAGE, text);
     }
     if kept.len() != complex.beams.len() {
@@ -297,22 +331,40 @@ fn tie_pieces(complex: &mut Complex, options: &ThickenOptions, rules: &mut RuleC
 fn tie_vector(complex: &Complex, v: u32, fan: &Fan) -> Vec3 {
     let at = complex.at(v);
     let count = fan.corners.len() as f64;
-    let mean = fan.corners.iter().map(|&(q, _)| complex.centres[q as usize] - at).sum::<Vec3>() / count;
+    let mean = fan
+        .corners
+        .iter()
+        .map(|&(q, _)| complex.centres[q as usize] - at)
+        .sum::<Vec3>()
+        / count;
     let (length, radius) = (mean.norm(), complex.radii[v as usize]);
     if length > 0.3 * radius {
         return mean * (radius.clamp(0.5 * length, 0.75 * length) / length);
     }
     // Almost symmetric about v: leave along the normal, towards where the piece bends.
-    let normals = fan.corners.iter().map(|&(q, _)| complex.normals[q as usize]);
+    let normals = fan
+        .corners
+        .iter()
+        .map(|&(q, _)| complex.normals[q as usize]);
     let first = complex.normals[fan.corners[0].0 as usize];
-    let normal = unit(normals.map(|n| if n.dot(&first) < 0.0 { -n } else { n }).sum());
-    normal * if normal.dot(&mean) < 0.0 { -radius } else { radius }
+    let normal = unit(
+        normals
+            .map(|n| if n.dot(&first) < 0.0 { -n } else { n })
+            .sum(),
+    );
+    normal
+        * if normal.dot(&mean) < 0.0 {
+            -radius
+        } else {
+            radius
+        }
 }
 
 /// Puts a vertex into every beam between two vertices that are not plain beam vertices.
 fn add_middles(complex: &mut Complex, rules: &mut RuleCounts) {
-    let plain =
-        |c: &Complex, v: u32| c.corners[v as usize].is_empty() && c.beam_neighbours[v as usize].len() == 2;
+    let plain = |c: &Complex, v: u32| {
+        c.corners[v as usize].is_empty() && c.beam_neighbours[v as usize].len() == 2
+    };
     for i in 0..complex.beams.len() {
         let [a, b] = complex.beams[i];
         if plain(complex, a) || plain(complex, b) {
@@ -320,7 +372,9 @@ fn add_middles(complex: &mut Complex, rules: &mut RuleCounts) {
         }
         let middle = complex.points.len() as u32;
         complex.points.push((complex.at(a) + complex.at(b)) / 2.0);
-        complex.radii.push((complex.radii[a as usize] + complex.radii[b as usize]) / 2.0);
+        complex
+            .radii
+            .push((complex.radii[a as usize] + complex.radii[b as usize]) / 2.0);
         complex.source.push(complex.source[a as usize]);
         complex.beams[i] = [a, middle];
         complex.beams.push([middle, b]);

@@ -92,7 +92,11 @@ pub struct ThickenOptions {
 
 impl Default for ThickenOptions {
     fn default() -> Self {
-        Self { scale: 0.5, mitre_limit: 2.2, axis_angle: 35.0 }
+        Self {
+            scale: 0.5,
+            mitre_limit: 2.2,
+            axis_angle: 35.0,
+        }
     }
 }
 
@@ -202,7 +206,10 @@ impl ThickenError {
         let text = match self {
             Self::Empty => "the proposal vanished under the skeleton thresholds: use a finer grid",
             Self::BadOption { .. } | Self::Cancelled(_) => return None,
-            Self::BadCount { .. } | Self::BadPoint { .. } | Self::BadQuad { .. } | Self::BadBeam { .. } => {
+            Self::BadCount { .. }
+            | Self::BadPoint { .. }
+            | Self::BadQuad { .. }
+            | Self::BadBeam { .. } => {
                 "correct the skeleton file: finite points, positive radii, quads and beams over distinct points"
             }
             Self::NotManifold { .. } | Self::BadVertex { .. } | Self::BadTopology { .. } => {
@@ -262,12 +269,28 @@ fn check_options(options: &ThickenOptions) -> Result<(), ThickenError> {
         if value.is_finite() && value > lo && value <= hi {
             Ok(())
         } else {
-            Err(ThickenError::BadOption { name, value, allowed })
+            Err(ThickenError::BadOption {
+                name,
+                value,
+                allowed,
+            })
         }
     };
-    inside("scale", options.scale, 0.0, 100.0, "more than 0, at most 100")?;
+    inside(
+        "scale",
+        options.scale,
+        0.0,
+        100.0,
+        "more than 0, at most 100",
+    )?;
     inside("mitre_limit", options.mitre_limit, 0.999, 100.0, "1 to 100")?;
-    inside("axis_angle", options.axis_angle, 0.0, 80.0, "more than 0, at most 80")
+    inside(
+        "axis_angle",
+        options.axis_angle,
+        0.0,
+        80.0,
+        "more than 0, at most 80",
+    )
 }
 
 /// Unit vector of `v`, or any unit vector when `v` is zero.

@@ -29,7 +29,12 @@ pub(super) struct Ring {
 
 /// The ring of vertex `v`, or `None` when the rule does not apply: a piece is no plain fan, a beam
 /// runs along the axis, or there is nothing to join.
-pub(super) fn ring(complex: &Complex, v: u32, fans: &[Fan], options: &ThickenOptions) -> Option<Ring> {
+pub(super) fn ring(
+    complex: &Complex,
+    v: u32,
+    fans: &[Fan],
+    options: &ThickenOptions,
+) -> Option<Ring> {
     let beams = &complex.beam_neighbours[v as usize];
     let nothing_to_join = match fans.len() {
         0 => beams.len() < 3,
@@ -41,7 +46,11 @@ pub(super) fn ring(complex: &Complex, v: u32, fans: &[Fan], options: &ThickenOpt
     }
     let at = complex.at(v);
     let beam_directions: Vec<Vec3> = beams.iter().map(|&w| unit(complex.at(w) - at)).collect();
-    let axis = if fans.is_empty() { best_axis(&beam_directions) } else { mean_normal(complex, fans) };
+    let axis = if fans.is_empty() {
+        best_axis(&beam_directions)
+    } else {
+        mean_normal(complex, fans)
+    };
     let limit = options.axis_angle.to_radians().cos();
     if beam_directions.iter().any(|d| d.dot(&axis).abs() > limit) {
         return None;
@@ -49,13 +58,24 @@ pub(super) fn ring(complex: &Complex, v: u32, fans: &[Fan], options: &ThickenOpt
     let across = perpendicular(&axis);
     let up = axis.cross(&across);
     let angle = |d: &Vec3| d.dot(&up).atan2(d.dot(&across));
-    let fan_direction =
-        |fan: &Fan| unit(fan.corners.iter().map(|&(q, _)| complex.centres[q as usize] - at).sum());
+    let fan_direction = |fan: &Fan| {
+        unit(
+            fan.corners
+                .iter()
+                .map(|&(q, _)| complex.centres[q as usize] - at)
+                .sum(),
+        )
+    };
     let mut order: Vec<(f64, Item)> = fans
         .iter()
         .enumerate()
         .map(|(i, fan)| (angle(&fan_direction(fan)), Item::Fan(i)))
-        .chain(beams.iter().zip(&beam_directions).map(|(&w, d)| (angle(d), Item::Beam(w))))
+        .chain(
+            beams
+                .iter()
+                .zip(&beam_directions)
+                .map(|(&w, d)| (angle(d), Item::Beam(w))),
+        )
         .collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
     let count = order.len();
@@ -67,16 +87,28 @@ pub(super) fn ring(complex: &Complex, v: u32, fans: &[Fan], options: &ThickenOpt
             (across * middle.cos() + up * middle.sin(), (to - from) / 2.0)
         })
         .collect();
-    Some(Ring { axis, items: order.into_iter().map(|o| o.1).collect(), gaps })
+    Some(Ring {
+        axis,
+        items: order.into_iter().map(|o| o.1).collect(),
+        gaps,
+    })
 }
 
 fn mean_normal(complex: &Complex, fans: &[Fan]) -> Vec3 {
     let mut sum = Vec3::zeros();
     for fan in fans {
         let signs = coherent_signs(complex, fan);
-        let normals = fan.corners.iter().zip(&signs).map(|(&(q, _), s)| *s * complex.normals[q as usize]);
+        let normals = fan
+            .corners
+            .iter()
+            .zip(&signs)
+            .map(|(&(q, _), s)| *s * complex.normals[q as usize]);
         let normal = unit(normals.sum());
-        sum += if sum.dot(&normal) < 0.0 { -normal } else { normal };
+        sum += if sum.dot(&normal) < 0.0 {
+            -normal
+        } else {
+            normal
+        };
     }
     unit(sum)
 }
@@ -86,7 +118,13 @@ fn best_axis(directions: &[Vec3]) -> Vec3 {
     let spread: Matrix3<f64> = directions.iter().map(|d| d * d.transpose()).sum();
     let eigen = SymmetricEigen::new(spread);
     let least: Vec3 = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();
-    let score = |n: &Vec3| directions.iter().map(|d| d.dot(n).abs()).fold(0.0, f64::max) + 0.2 * crowding(directions, n);
+    let score = |n: &Vec3| {
+        directions
+            .iter()
+            .map(|d| d.dot(n).abs())
+            .fold(0.0, f64::max)
+            + 0.2 * crowding(directions, n)
+    };
     let mut best = (score(&least) - 0.05, least);
     for candidate in hemisphere(200) {
         let s = score(&candidate);
@@ -101,10 +139,14 @@ fn best_axis(directions: &[Vec3]) -> Vec3 {
 fn crowding(directions: &[Vec3], axis: &Vec3) -> f64 {
     let across = perpendicular(axis);
     let up = axis.cross(&across);
-    let mut angles: Vec<f64> = directions.iter().map(|d| d.dot(&up).atan2(d.dot(&across))).collect();
+    let mut angles: Vec<f64> = directions
+        .iter()
+        .map(|d| d.dot(&up).atan2(d.dot(&across)))
+        .collect();
     angles.sort_by(f64::total_cmp);
     let count = angles.len();
-    let gap = |k: usize| angles[(k + 1) % count] - angles[k] + if k + 1 == count { TAU } else { 0.0 };
+    let gap =
+        |k: usize| angles[(k + 1) % count] - angles[k] + if k + 1 == count { TAU } else { 0.0 };
     let narrowest = (0..count).map(gap).fold(TAU, f64::min);
     1.0 - narrowest * count as f64 / TAU
 }
@@ -139,15 +181,24 @@ pub(super) fn polyhedron(directions: &[Vec3]) -> Polyhedron {
     let mut best: Option<(f64, Polyhedron)> = None;
     for n in least..=least.max(3) {
         let (corners, quads) = divided_cube(n);
-        let normals: Vec<Vec3> =
-            quads.iter().map(|q| unit(q.iter().map(|&c| corners[c as usize]).sum())).collect();
+        let normals: Vec<Vec3> = quads
+            .iter()
+            .map(|q| unit(q.iter().map(|&c| corners[c as usize]).sum()))
+            .collect();
         for rotation in rotations(directions) {
             let turned: Vec<Vec3> = normals.iter().map(|m| rotation * m).collect();
             let (quad_of_beam, worst, mean) = assign(directions, &turned);
             let score = worst + 0.1 * mean;
             if best.as_ref().is_none_or(|b| score > b.0 + 1e-9) {
                 let corners = corners.iter().map(|c| rotation * c).collect();
-                best = Some((score, Polyhedron { corners, quads: quads.clone(), quad_of_beam }));
+                best = Some((
+                    score,
+                    Polyhedron {
+                        corners,
+                        quads: quads.clone(),
+                        quad_of_beam,
+                    },
+                ));
             }
         }
         if best.as_ref().is_some_and(|b| b.0 > enough + 0.09) {
@@ -162,18 +213,29 @@ pub(super) fn polyhedron(directions: &[Vec3]) -> Polyhedron {
 fn rotations(directions: &[Vec3]) -> Vec<Rotation3<f64>> {
     let frame = |x: &Vec3, hint: &Vec3| {
         let z = x.cross(hint).try_normalize(1e-6)?;
-        Some(Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[*x, z.cross(x), z])))
+        Some(Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[
+            *x,
+            z.cross(x),
+            z,
+        ])))
     };
     let some = directions.len().min(8);
     let mut list = Vec::new();
     for i in 0..some {
-        list.extend((0..some).filter(|&j| j != i).filter_map(|j| frame(&directions[i], &directions[j])));
+        list.extend(
+            (0..some)
+                .filter(|&j| j != i)
+                .filter_map(|j| frame(&directions[i], &directions[j])),
+        );
     }
     let spread = (2400 / directions.len().max(8)).max(8);
     for (i, x) in hemisphere(spread).enumerate() {
         let across = perpendicular(&x);
         let turn = 2.399_963 * i as f64;
-        list.extend(frame(&x, &(across * turn.cos() + x.cross(&across) * turn.sin())));
+        list.extend(frame(
+            &x,
+            &(across * turn.cos() + x.cross(&across) * turn.sin()),
+        ));
     }
     list
 }
@@ -211,7 +273,11 @@ fn assign(directions: &[Vec3], normals: &[Vec3]) -> (Vec<u32>, f64, f64) {
             }
         }
     }
-    let cosines: Vec<f64> = quad_of.iter().enumerate().map(|(b, &q)| cosine(b, q)).collect();
+    let cosines: Vec<f64> = quad_of
+        .iter()
+        .enumerate()
+        .map(|(b, &q)| cosine(b, q))
+        .collect();
     let mean = cosines.iter().sum::<f64>() / cosines.len().max(1) as f64;
     let worst = cosines.iter().copied().fold(1.0, f64::min);
     (quad_of.iter().map(|&q| q as u32).collect(), worst, mean)
@@ -275,12 +341,17 @@ mod tests {
     #[test]
     fn cubic_axes_get_the_plain_cube() {
         let tilt = Rotation3::from_euler_angles(0.3, 0.5, 0.7);
-        let axes: Vec<Vec3> =
-            [Vec3::x(), Vec3::y(), Vec3::z()].iter().flat_map(|a| [tilt * a, -(tilt * a)]).collect();
+        let axes: Vec<Vec3> = [Vec3::x(), Vec3::y(), Vec3::z()]
+            .iter()
+            .flat_map(|a| [tilt * a, -(tilt * a)])
+            .collect();
         let cube = polyhedron(&axes);
         assert_eq!(cube.quads.len(), 6);
         for (d, &q) in axes.iter().zip(&cube.quad_of_beam) {
-            let centre: Vec3 = cube.quads[q as usize].iter().map(|&c| cube.corners[c as usize]).sum();
+            let centre: Vec3 = cube.quads[q as usize]
+                .iter()
+                .map(|&c| cube.corners[c as usize])
+                .sum();
             assert!(unit(centre).dot(d) > 0.999_999);
         }
     }

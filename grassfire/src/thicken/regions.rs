@@ -80,9 +80,17 @@ fn slot((q, k): (u32, u8), side: f64) -> usize {
 }
 
 /// Steps 2 to 4 of [`super::thicken`].
-pub(super) fn offset_sheets(complex: &Complex, options: &ThickenOptions, rules: &mut RuleCounts) -> Draft {
+pub(super) fn offset_sheets(
+    complex: &Complex,
+    options: &ThickenOptions,
+    rules: &mut RuleCounts,
+) -> Draft {
     let n = complex.points.len();
-    let mut draft = Draft { vertex_points: vec![Vec::new(); n], feet: vec![Foot::None; n], ..Draft::default() };
+    let mut draft = Draft {
+        vertex_points: vec![Vec::new(); n],
+        feet: vec![Foot::None; n],
+        ..Draft::default()
+    };
     let mut offsets = Offsets {
         class: (0..8 * complex.quads.len()).collect(),
         side: vec![NONE; 8 * complex.quads.len()],
@@ -97,7 +105,11 @@ pub(super) fn offset_sheets(complex: &Complex, options: &ThickenOptions, rules: 
         } else if let Some(ring) = node::ring(complex, v, &fans, options) {
             draft.feet[v as usize] = Foot::Ready;
             build_ring(complex, v, &fans, &ring, options, &mut offsets, &mut draft);
-            *(if fans.is_empty() { &mut rules.ring_nodes } else { &mut rules.ring_feet }) += 1;
+            *(if fans.is_empty() {
+                &mut rules.ring_nodes
+            } else {
+                &mut rules.ring_feet
+            }) += 1;
         } else if fans.is_empty() {
             draft.feet[v as usize] = Foot::Ready;
             build_polyhedron(complex, v, &mut draft);
@@ -134,7 +146,11 @@ fn sides_at(complex: &Complex, ends: [u32; 2], (q, k): (u32, u8), turn: f64) -> 
     let along = complex.quads[q as usize][k as usize] == ends[0];
     let side = if along { turn } else { -turn };
     let (first, second) = (slot((q, k), side), slot((q, (k + 1) % 4), side));
-    if along { [first, second] } else { [second, first] }
+    if along {
+        [first, second]
+    } else {
+        [second, first]
+    }
 }
 
 /// Corner sides, at the two ends of an edge, that face the sector after the given quad.
@@ -161,7 +177,10 @@ pub(super) fn around_edge(complex: &Complex, ends: [u32; 2], uses: &[(u32, u8)])
         .enumerate()
         .map(|(i, &u)| {
             let d = away(u.0);
-            let angle = d.dot(&up).atan2(d.dot(&across)).rem_euclid(std::f64::consts::TAU);
+            let angle = d
+                .dot(&up)
+                .atan2(d.dot(&across))
+                .rem_euclid(std::f64::consts::TAU);
             (if i == 0 { -1.0 } else { angle }, u)
         })
         .collect();
@@ -185,7 +204,8 @@ fn build_ring(
         .gaps
         .iter()
         .map(|(d, half)| {
-            let mitre = (1.0 / half.min(std::f64::consts::FRAC_PI_2).sin()).min(options.mitre_limit);
+            let mitre =
+                (1.0 / half.min(std::f64::consts::FRAC_PI_2).sin()).min(options.mitre_limit);
             draft.point(at + radius * mitre * d, v)
         })
         .collect();
@@ -199,7 +219,9 @@ fn build_ring(
                 let fan = &fans[i];
                 let mut signs = coherent_signs(complex, fan);
                 let corners = || fan.corners.iter().zip(&signs);
-                let up: f64 = corners().map(|(c, s)| s * complex.normals[c.0 as usize].dot(&ring.axis)).sum();
+                let up: f64 = corners()
+                    .map(|(c, s)| s * complex.normals[c.0 as usize].dot(&ring.axis))
+                    .sum();
                 if up < 0.0 {
                     signs.iter_mut().for_each(|s| *s = -*s);
                 }
@@ -212,7 +234,11 @@ fn build_ring(
                     for (e, leaves) in [(leaving, true), (arriving, false)] {
                         if complex.edges[e as usize].uses.len() == 1 {
                             let end = usize::from(complex.edges[e as usize].ends[1] == v);
-                            offsets.rim[e as usize][end] = if leaves == (sign > 0.0) { before } else { after };
+                            offsets.rim[e as usize][end] = if leaves == (sign > 0.0) {
+                                before
+                            } else {
+                                after
+                            };
                         }
                     }
                 }
@@ -226,10 +252,16 @@ fn build_polyhedron(complex: &Complex, v: u32, draft: &mut Draft) {
     let beams = &complex.beam_neighbours[v as usize];
     let directions: Vec<Vec3> = beams.iter().map(|&w| unit(complex.at(w) - at)).collect();
     let shape = node::polyhedron(&directions);
-    let ids: Vec<u32> = shape.corners.iter().map(|c| draft.point(at + radius * c, v)).collect();
+    let ids: Vec<u32> = shape
+        .corners
+        .iter()
+        .map(|c| draft.point(at + radius * c, v))
+        .collect();
     let mut open = vec![false; shape.quads.len()];
     for (&w, &q) in beams.iter().zip(&shape.quad_of_beam) {
-        draft.sections.insert((v, w), shape.quads[q as usize].map(|c| ids[c as usize]));
+        draft
+            .sections
+            .insert((v, w), shape.quads[q as usize].map(|c| ids[c as usize]));
         open[q as usize] = true;
     }
     for (quad, _) in shape.quads.iter().zip(&open).filter(|(_, open)| !**open) {
@@ -238,7 +270,13 @@ fn build_polyhedron(complex: &Complex, v: u32, draft: &mut Draft) {
 }
 
 /// One offset point a class of corner sides, one rim point a group of classes joined by rims.
-fn build_regions(complex: &Complex, v: u32, options: &ThickenOptions, offsets: &mut Offsets, draft: &mut Draft) {
+fn build_regions(
+    complex: &Complex,
+    v: u32,
+    options: &ThickenOptions,
+    offsets: &mut Offsets,
+    draft: &mut Draft,
+) {
     let (at, radius) = (complex.at(v), complex.radii[v as usize]);
     let corners = &complex.corners[v as usize];
     let mut sides: Vec<(usize, (u32, u8), f64)> = Vec::with_capacity(2 * corners.len());
@@ -249,7 +287,11 @@ fn build_regions(complex: &Complex, v: u32, options: &ThickenOptions, offsets: &
     }
     sides.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.cmp(&b.1)));
     for class in sides.chunk_by(|a, b| a.0 == b.0) {
-        let normals = || class.iter().map(|&(_, (q, _), side)| side * complex.normals[q as usize]);
+        let normals = || {
+            class
+                .iter()
+                .map(|&(_, (q, _), side)| side * complex.normals[q as usize])
+        };
         let normal = unit(normals().sum());
         let cosine = normals().map(|n| n.dot(&normal)).sum::<f64>() / class.len() as f64;
         let mitre = (1.0 / cosine.max(1e-9)).clamp(1.0, options.mitre_limit);
@@ -280,11 +322,16 @@ fn build_rims(complex: &Complex, v: u32, offsets: &mut Offsets, draft: &mut Draf
     let local = |class: usize| names.binary_search(&class).unwrap_or(0);
     let mut group: Vec<usize> = (0..names.len()).collect();
     for (_, _, classes) in &rims {
-        let (a, b) = (root(&mut group, local(classes[0])), root(&mut group, local(classes[1])));
+        let (a, b) = (
+            root(&mut group, local(classes[0])),
+            root(&mut group, local(classes[1])),
+        );
         group[a.max(b)] = a.min(b);
     }
-    let mut keyed: Vec<(usize, u32, u32)> =
-        rims.iter().map(|&(e, (q, _), classes)| (root(&mut group, local(classes[0])), e, q)).collect();
+    let mut keyed: Vec<(usize, u32, u32)> = rims
+        .iter()
+        .map(|&(e, (q, _), classes)| (root(&mut group, local(classes[0])), e, q))
+        .collect();
     keyed.sort_unstable();
     let at = complex.at(v);
     for members in keyed.chunk_by(|a, b| a.0 == b.0) {
@@ -314,13 +361,27 @@ fn emit_sheets(complex: &Complex, offsets: &Offsets, draft: &mut Draft, rules: &
         draft.quad(side(1.0));
         draft.quad([d, c, b, a]);
     }
-    for (edge, rim) in complex.edges.iter().zip(&offsets.rim).filter(|(e, _)| e.uses.len() == 1) {
+    for (edge, rim) in complex
+        .edges
+        .iter()
+        .zip(&offsets.rim)
+        .filter(|(e, _)| e.uses.len() == 1)
+    {
         let (q, k) = edge.uses[0];
         let next = (k + 1) % 4;
         let side = |k: u8, side: f64| offsets.side[slot((q, k), side)];
-        let (tp, tq, bp, bq) = (side(k, 1.0), side(next, 1.0), side(k, -1.0), side(next, -1.0));
+        let (tp, tq, bp, bq) = (
+            side(k, 1.0),
+            side(next, 1.0),
+            side(k, -1.0),
+            side(next, -1.0),
+        );
         let along = complex.quads[q as usize][k as usize] == edge.ends[0];
-        let (rp, rq) = if along { (rim[0], rim[1]) } else { (rim[1], rim[0]) };
+        let (rp, rq) = if along {
+            (rim[0], rim[1])
+        } else {
+            (rim[1], rim[0])
+        };
         rules.seam_ends += u32::from(rp == NONE) + u32::from(rq == NONE);
         match (rp, rq) {
             (NONE, NONE) => {}

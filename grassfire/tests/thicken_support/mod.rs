@@ -18,7 +18,10 @@ pub struct Builder {
 
 impl Builder {
     pub fn new(radius: f64) -> Self {
-        Self { radius, ..Self::default() }
+        Self {
+            radius,
+            ..Self::default()
+        }
     }
 
     pub fn point(&mut self, p: Vec3) -> u32 {
@@ -41,11 +44,17 @@ impl Builder {
         for i in 0..n {
             for j in 0..m {
                 if !hole(i, j) {
-                    let at = |i: usize, j: usize| origin + u * i as f64 / n as f64 + v * j as f64 / m as f64;
+                    let at = |i: usize, j: usize| {
+                        origin + u * i as f64 / n as f64 + v * j as f64 / m as f64
+                    };
                     let corners = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
                     let quad = corners.map(|p| self.point(p));
                     // Cycles are not coherent in real skeletons either.
-                    let quad = if (i * 7 + j * 3) % 5 < 2 { [quad[3], quad[2], quad[1], quad[0]] } else { quad };
+                    let quad = if (i * 7 + j * 3) % 5 < 2 {
+                        [quad[3], quad[2], quad[1], quad[0]]
+                    } else {
+                        quad
+                    };
                     self.skeleton.quads.push(quad);
                 }
             }
@@ -113,17 +122,27 @@ pub fn read_skeleton(path: &Path) -> Skeleton {
     let text = std::fs::read_to_string(path).expect("skeleton file");
     let (header, data) = text.split_once("end_header\n").expect("PLY header");
     let count = |name: &str| -> usize {
-        let line = header.lines().find(|l| l.starts_with(&format!("element {name} ")));
-        line.and_then(|l| l.rsplit(' ').next()).and_then(|n| n.parse().ok()).unwrap_or(0)
+        let line = header
+            .lines()
+            .find(|l| l.starts_with(&format!("element {name} ")));
+        line.and_then(|l| l.rsplit(' ').next())
+            .and_then(|n| n.parse().ok())
+            .unwrap_or(0)
     };
-    let mut lines = data.lines().map(|l| l.split_whitespace().map(|w| w.parse::<f64>().expect("number")).collect::<Vec<_>>());
+    let mut lines = data.lines().map(|l| {
+        l.split_whitespace()
+            .map(|w| w.parse::<f64>().expect("number"))
+            .collect::<Vec<_>>()
+    });
     let mut skeleton = Skeleton::default();
     for row in lines.by_ref().take(count("vertex")) {
         skeleton.points.push(v(row[0], row[1], row[2]));
         skeleton.radii.push(row[3]);
     }
     for row in lines.by_ref().take(count("face")) {
-        skeleton.quads.push([row[1] as u32, row[2] as u32, row[3] as u32, row[4] as u32]);
+        skeleton
+            .quads
+            .push([row[1] as u32, row[2] as u32, row[3] as u32, row[4] as u32]);
     }
     for row in lines.take(count("edge")) {
         skeleton.beams.push([row[0] as u32, row[1] as u32]);
@@ -138,9 +157,16 @@ pub fn read_field(folder: &Path) -> VoxelGrid<f32> {
     let number = |value: &serde_json::Value| value.as_f64().expect("number");
     let bytes = std::fs::read(folder.join("field.npy")).expect("field.npy");
     let header = u16::from_le_bytes([bytes[8], bytes[9]]) as usize;
-    let values = bytes[10 + header..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    let values = bytes[10 + header..]
+        .chunks_exact(4)
+        .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        .collect();
     VoxelGrid {
-        origin: v(number(&json["origin"][0]), number(&json["origin"][1]), number(&json["origin"][2])),
+        origin: v(
+            number(&json["origin"][0]),
+            number(&json["origin"][1]),
+            number(&json["origin"][2]),
+        ),
         spacing: number(&json["spacing"]),
         dims: [0, 1, 2].map(|a| number(&json["dims"][a]) as usize),
         values,
