@@ -9,9 +9,6 @@ pub mod winding;
 
 pub use bvh::{Bvh, Nearest};
 pub use distance::{Distance, DistanceOptions, DistanceSummary, two_sided};
-pub use repair::{
-    Repair, RepairError, RepairKind, RepairOptions, RepairReport, Repaired, repair,
-};
 pub use repair::{Repair, RepairError, RepairKind, RepairOptions, RepairReport, Repaired, repair};
 pub use solid::{Solid, SolidError};
 pub use winding::Winding;
