@@ -142,10 +142,21 @@ impl PipelineError {
 /// [`PipelineError`] names the stage.
 pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
     monitor.step("input", "reading", 0.0)?;
-    let refuse = |source| PipelineError::Input { stage: "input", source, hint: None };
-    let bytes = std::fs::read(&job.part).map_err(|e| refuse(format!("{}: {e}", job.part.display()).into()))?;
+    let refuse = |source| PipelineError::Input {
+        stage: "input",
+        source,
+        hint: None,
+    };
+    let bytes = std::fs::read(&job.part)
+        .map_err(|e| refuse(format!("{}: {e}", job.part.display()).into()))?;
     if bytes.is_empty() {
-        return Err(refuse(format!("{}: the file is empty", job.part.display()).into()));
+        return Err(refuse(
+            format!("{}: the file is empty", job.part.display()).into(),
+        ));
     }
-    Err(PipelineError::Solver { stage: "remesh", source: "the stages are not joined yet".into(), hint: None })
+    Err(PipelineError::Solver {
+        stage: "remesh",
+        source: "the stages are not joined yet".into(),
+        hint: None,
+    })
 }
