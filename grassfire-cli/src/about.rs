@@ -6,8 +6,15 @@ use grassfire::report::papers;
 
 /// Version and licence; with `cite` the papers whose methods are used.
 pub fn text(cite: bool) -> String {
-    let kernel = if cfg!(feature = "occt") { "with OpenCASCADE" } else { "without a CAD kernel" };
-    let mut text = format!("grassfire {} ({kernel}), MIT OR Apache-2.0\n", env!("CARGO_PKG_VERSION"));
+    let kernel = if cfg!(feature = "occt") {
+        "with OpenCASCADE"
+    } else {
+        "without a CAD kernel"
+    };
+    let mut text = format!(
+        "grassfire {} ({kernel}), MIT OR Apache-2.0\n",
+        env!("CARGO_PKG_VERSION")
+    );
     if !cite {
         return text;
     }
@@ -18,7 +25,12 @@ pub fn text(cite: bool) -> String {
         if !paper.doi.is_empty() {
             let _ = write!(text, " https://doi.org/{}", paper.doi);
         }
-        let _ = writeln!(text, "\n    {}: {}", paper.stages.join(", "), paper.used_for);
+        let _ = writeln!(
+            text,
+            "\n    {}: {}",
+            paper.stages.join(", "),
+            paper.used_for
+        );
     }
     text
 }

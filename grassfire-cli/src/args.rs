@@ -137,10 +137,18 @@ pub struct RunArgs {
 
 fn finite(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    if value.is_finite() { Ok(value) } else { Err("must be finite".to_owned()) }
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err("must be finite".to_owned())
+    }
 }
 
 fn positive(text: &str) -> Result<f64, String> {
     let value = finite(text)?;
-    if value > 0.0 { Ok(value) } else { Err("must be above 0".to_owned()) }
+    if value > 0.0 {
+        Ok(value)
+    } else {
+        Err("must be above 0".to_owned())
+    }
 }

@@ -38,12 +38,18 @@ fn dispatch(command: &Command) -> Result<u8, Failure> {
         Command::Schema => run::print(&schema()?),
         Command::About(args) => run::print(&about::text(args.cite)),
         Command::Completions { shell } => {
-            clap_complete::generate(*shell, &mut Cli::command(), "grassfire", &mut std::io::stdout().lock());
+            clap_complete::generate(
+                *shell,
+                &mut Cli::command(),
+                "grassfire",
+                &mut std::io::stdout().lock(),
+            );
         }
         Command::Man => {
             let mut page = Vec::new();
             let written = clap_mangen::Man::new(Cli::command()).render(&mut page);
-            written.map_err(|e| Failure::usage(format!("cannot make the manual page: {e}"), None))?;
+            written
+                .map_err(|e| Failure::usage(format!("cannot make the manual page: {e}"), None))?;
             run::print(&String::from_utf8_lossy(&page));
         }
     }
@@ -53,7 +59,8 @@ fn dispatch(command: &Command) -> Result<u8, Failure> {
 fn schema() -> Result<String, Failure> {
     let schema = schemars::schema_for!(ReconstructOptions);
     let text = serde_json::to_string_pretty(&schema);
-    text.map(|text| text + "\n").map_err(|e| Failure::usage(format!("cannot write the schema: {e}"), None))
+    text.map(|text| text + "\n")
+        .map_err(|e| Failure::usage(format!("cannot write the schema: {e}"), None))
 }
 
 /// Help and version are answers; everything else that clap refuses is an error in our two lines.
@@ -66,7 +73,10 @@ fn usage(error: &clap::Error) -> Result<u8, Failure> {
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
             let _ = error.print();
             eprintln!();
-            Err(Failure::usage("no command was given", Some("grassfire reconstruct part.stl -o out".to_owned())))
+            Err(Failure::usage(
+                "no command was given",
+                Some("grassfire reconstruct part.stl -o out".to_owned()),
+            ))
         }
         _ => Err(failure::from_clap(error)),
     }

@@ -44,12 +44,25 @@ impl Bar {
         if let Ok(style) = ProgressStyle::with_template(line) {
             let left = |state: &indicatif::ProgressState, out: &mut dyn std::fmt::Write| {
                 let seconds = state.eta().as_secs();
-                let _ = if seconds > 0 { write!(out, "({seconds} s left)") } else { Ok(()) };
+                let _ = if seconds > 0 {
+                    write!(out, "({seconds} s left)")
+                } else {
+                    Ok(())
+                };
             };
             bar.set_style(style.with_key("eta_text", left).progress_chars("━━─"));
         }
-        let now = Now { stage: String::new(), what: String::new(), started: Instant::now(), shown: false };
-        Self { bar, talk, now: Mutex::new(now) }
+        let now = Now {
+            stage: String::new(),
+            what: String::new(),
+            started: Instant::now(),
+            shown: false,
+        };
+        Self {
+            bar,
+            talk,
+            now: Mutex::new(now),
+        }
     }
 
     /// Ends the last stage and removes the bar.
@@ -63,7 +76,11 @@ impl Bar {
 
     fn end_stage(&self, now: &Now) {
         if self.talk == Talk::Verbose && !now.stage.is_empty() {
-            let line = format!("{:>9} {:.1} s", now.stage, now.started.elapsed().as_secs_f64());
+            let line = format!(
+                "{:>9} {:.1} s",
+                now.stage,
+                now.started.elapsed().as_secs_f64()
+            );
             self.bar.suspend(|| eprintln!("{line}"));
         }
     }
@@ -87,11 +104,13 @@ impl Progress for Bar {
             self.bar.set_message(what.to_owned());
         }
         if !now.shown && now.started.elapsed() > PATIENCE {
-            self.bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(8));
+            self.bar
+                .set_draw_target(ProgressDrawTarget::stderr_with_hz(8));
             self.bar.enable_steady_tick(Duration::from_millis(250));
             now.shown = true;
         }
-        self.bar.set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
+        self.bar
+            .set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
     }
 }
 

@@ -10,9 +10,16 @@ pub enum SettingError {
     /// No `=`.
     NoValue(String),
     /// No option has this key; the nearest one is given.
-    UnknownKey { key: String, nearest: Option<String> },
+    UnknownKey {
+        key: String,
+        nearest: Option<String>,
+    },
     /// The option does not take this value.
-    BadValue { key: String, value: String, reason: String },
+    BadValue {
+        key: String,
+        value: String,
+        reason: String,
+    },
 }
 
 impl std::fmt::Display for SettingError {
@@ -30,8 +37,13 @@ impl SettingError {
     pub fn hint(&self) -> String {
         match self {
             Self::NoValue(_) => "for example --set remesh.min_tunnel=0".to_owned(),
-            Self::UnknownKey { nearest: Some(nearest), .. } => format!("did you mean {nearest}?"),
-            Self::UnknownKey { .. } | Self::BadValue { .. } => "`grassfire schema` lists all options".to_owned(),
+            Self::UnknownKey {
+                nearest: Some(nearest),
+                ..
+            } => format!("did you mean {nearest}?"),
+            Self::UnknownKey { .. } | Self::BadValue { .. } => {
+                "`grassfire schema` lists all options".to_owned()
+            }
         }
     }
 }
@@ -47,11 +59,22 @@ pub fn split(text: &str) -> Result<(&str, &str), SettingError> {
 /// `options` with the dotted `key` set to `value`: JSON where it parses (numbers, true, lists, "quoted"), else text.
 ///
 /// One key at a time, so that an error names the setting that caused it.
-pub fn set<T: Serialize + DeserializeOwned>(options: &T, key: &str, value: &str) -> Result<T, SettingError> {
-    let bad = |reason: String| SettingError::BadValue { key: key.to_owned(), value: value.to_owned(), reason };
+pub fn set<T: Serialize + DeserializeOwned>(
+    options: &T,
+    key: &str,
+    value: &str,
+) -> Result<T, SettingError> {
+    let bad = |reason: String| SettingError::BadValue {
+        key: key.to_owned(),
+        value: value.to_owned(),
+        reason,
+    };
     let mut tree = serde_json::to_value(options).map_err(|e| bad(e.to_string()))?;
     let Some(place) = find(&mut tree, key) else {
-        return Err(SettingError::UnknownKey { key: key.to_owned(), nearest: nearest(&tree, key) });
+        return Err(SettingError::UnknownKey {
+            key: key.to_owned(),
+            nearest: nearest(&tree, key),
+        });
     };
     *place = serde_json::from_str(value).unwrap_or_else(|_| Value::String(value.to_owned()));
     serde_json::from_value(tree).map_err(|e| bad(e.to_string()))
@@ -79,14 +102,20 @@ fn nearest(tree: &Value, key: &str) -> Option<String> {
         let own = strsim::damerau_levenshtein(&last(known), &last(key));
         (whole.min(2 * own + 1), whole)
     };
-    keys.into_iter().min_by_key(distance).filter(|known| distance(known).0 <= 2 + known.len() / 3)
+    keys.into_iter()
+        .min_by_key(distance)
+        .filter(|known| distance(known).0 <= 2 + known.len() / 3)
 }
 
 fn collect(prefix: &str, tree: &Value, keys: &mut Vec<String>) {
     match tree {
         Value::Object(map) => {
             for (key, value) in map {
-                let path = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+                let path = if prefix.is_empty() {
+                    key.clone()
+                } else {
+                    format!("{prefix}.{key}")
+                };
                 collect(&path, value, keys);
             }
         }
@@ -106,9 +135,18 @@ mod tests {
 
     #[test]
     fn sets_nested_and_optional_values() {
-        assert_eq!(set(&defaults(), "remesh.voxel", "0.75").map(|o| o.remesh.voxel), Ok(Some(0.75)));
-        assert_eq!(set(&defaults(), "repair.strict", "true").map(|o| o.repair.strict), Ok(true));
-        assert_eq!(set(&defaults(), "report.limits.volume", "0.05").map(|o| o.report.limits.volume), Ok(0.05));
+        assert_eq!(
+            set(&defaults(), "remesh.voxel", "0.75").map(|o| o.remesh.voxel),
+            Ok(Some(0.75))
+        );
+        assert_eq!(
+            set(&defaults(), "repair.strict", "true").map(|o| o.repair.strict),
+            Ok(true)
+        );
+        assert_eq!(
+            set(&defaults(), "report.limits.volume", "0.05").map(|o| o.report.limits.volume),
+            Ok(0.05)
+        );
         assert_eq!(set(&defaults(), "threads", "2").map(|o| o.threads), Ok(2));
     }
 
@@ -126,8 +164,14 @@ mod tests {
 
     #[test]
     fn refuses_bad_values() {
-        assert!(matches!(set(&defaults(), "remesh.voxel", "thick"), Err(SettingError::BadValue { .. })));
-        assert!(matches!(set(&defaults(), "remesh", "1"), Err(SettingError::BadValue { .. })));
+        assert!(matches!(
+            set(&defaults(), "remesh.voxel", "thick"),
+            Err(SettingError::BadValue { .. })
+        ));
+        assert!(matches!(
+            set(&defaults(), "remesh", "1"),
+            Err(SettingError::BadValue { .. })
+        ));
         assert_eq!(split("a.b"), Err(SettingError::NoValue("a.b".to_owned())));
         assert_eq!(split(" a.b = 3 "), Ok(("a.b", "3")));
     }

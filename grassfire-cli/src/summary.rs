@@ -11,38 +11,82 @@ pub fn text(report: &Report, output: &Path) -> String {
     if let Some(block) = &report.remesh {
         let topology = match block.changes.len() {
             0 => String::new(),
-            n => format!(", {n} pinholes and the like removed (genus {} -> {})", block.genus_before, block.genus_after),
+            n => format!(
+                ", {n} pinholes and the like removed (genus {} -> {})",
+                block.genus_before, block.genus_after
+            ),
         };
-        lines.push(("proposal", format!("{:.0} mm3, voxel {:.3} mm{topology}", block.volume, block.voxel)));
+        lines.push((
+            "proposal",
+            format!(
+                "{:.0} mm3, voxel {:.3} mm{topology}",
+                block.volume, block.voxel
+            ),
+        ));
     }
     if let Some(block) = &report.skeleton {
-        lines.push(("skeleton", format!("{} quads, {} beams, {} sheets", block.quads, block.beams, block.sheets)));
+        lines.push((
+            "skeleton",
+            format!(
+                "{} quads, {} beams, {} sheets",
+                block.quads, block.beams, block.sheets
+            ),
+        ));
     }
     if let Some(block) = &report.solid {
         let difference = match &report.volume {
             Some(volume) => format!(" ({:+.2} %)", 100.0 * volume.relative_difference),
             None => String::new(),
         };
-        let bodies = if block.bodies == 1 { "1 body".to_owned() } else { format!("{} bodies", block.bodies) };
+        let bodies = if block.bodies == 1 {
+            "1 body".to_owned()
+        } else {
+            format!("{} bodies", block.bodies)
+        };
         let verdict = if block.valid { "valid" } else { "NOT VALID" };
-        let sizes = format!("{bodies}, {} faces, genus {}, {:.0} mm3", block.faces, block.genus, block.volume);
+        let sizes = format!(
+            "{bodies}, {} faces, genus {}, {:.0} mm3",
+            block.faces, block.genus, block.volume
+        );
         lines.push(("solid", format!("{verdict}, {sizes}{difference}")));
     }
     if let Some(block) = &report.distance {
         let voxels = |mm: f64| mm / block.voxel;
         let (rms, p95) = (voxels(block.rms), voxels(block.p95));
-        lines.push(("distance", format!("rms {rms:.2} voxels, 95 % within {p95:.2} voxels ({:.3} mm)", block.p95)));
+        lines.push((
+            "distance",
+            format!(
+                "rms {rms:.2} voxels, 95 % within {p95:.2} voxels ({:.3} mm)",
+                block.p95
+            ),
+        ));
     }
     let met = report.checks.iter().filter(|check| check.met).count();
     lines.push(("checks", format!("{met} of {} met", report.checks.len())));
     for check in report.checks.iter().filter(|check| !check.met) {
-        let value = check.value.map_or_else(|| "not measured".to_owned(), |v| format!("{v:.4}"));
-        let unit = if check.unit.is_empty() { String::new() } else { format!(" {}", check.unit) };
-        lines.push(("not met", format!("{}: {value}{unit}, at most {}{unit} ({})", check.text, check.limit, check.name)));
+        let value = check
+            .value
+            .map_or_else(|| "not measured".to_owned(), |v| format!("{v:.4}"));
+        let unit = if check.unit.is_empty() {
+            String::new()
+        } else {
+            format!(" {}", check.unit)
+        };
+        lines.push((
+            "not met",
+            format!(
+                "{}: {value}{unit}, at most {}{unit} ({})",
+                check.text, check.limit, check.name
+            ),
+        ));
     }
     if !report.stages.is_empty() {
         let seconds: f64 = report.stages.iter().map(|stage| stage.seconds).sum();
-        let memory = report.stages.iter().map(|stage| stage.peak_memory).fold(0.0, f64::max);
+        let memory = report
+            .stages
+            .iter()
+            .map(|stage| stage.peak_memory)
+            .fold(0.0, f64::max);
         lines.push(("time", format!("{seconds:.1} s, {memory:.0} MB")));
     }
     for name in ["part.step", "report.html"] {
@@ -66,9 +110,23 @@ mod tests {
     #[test]
     fn reads_well() {
         let mut report = Report {
-            solid: Some(SolidBlock { valid: true, bodies: 1, faces: 104, volume: 62_012.4, genus: 7, ..SolidBlock::default() }),
-            volume: Some(VolumeBlock { proposal: 60_000.0, solid: 62_012.4, relative_difference: 0.033_54 }),
-            files: vec![FileEntry { path: "part.step".to_owned(), ..FileEntry::default() }],
+            solid: Some(SolidBlock {
+                valid: true,
+                bodies: 1,
+                faces: 104,
+                volume: 62_012.4,
+                genus: 7,
+                ..SolidBlock::default()
+            }),
+            volume: Some(VolumeBlock {
+                proposal: 60_000.0,
+                solid: 62_012.4,
+                relative_difference: 0.033_54,
+            }),
+            files: vec![FileEntry {
+                path: "part.step".to_owned(),
+                ..FileEntry::default()
+            }],
             ..Report::default()
         };
         report.checks = judge(&report, &Limits::default());

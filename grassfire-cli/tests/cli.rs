@@ -4,7 +4,11 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 fn grassfire(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_grassfire")).args(args).env_remove("COLUMNS").output().expect("the program starts")
+    Command::new(env!("CARGO_BIN_EXE_grassfire"))
+        .args(args)
+        .env_remove("COLUMNS")
+        .output()
+        .expect("the program starts")
 }
 
 fn stdout(output: &Output) -> String {
@@ -108,7 +112,11 @@ fn reconstruct_help_is_complete() {
 fn no_command_is_a_usage_error() {
     let output = grassfire(&[]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).ends_with("error: no command was given\nhint: grassfire reconstruct part.stl -o out\n"));
+    assert!(
+        stderr(&output).ends_with(
+            "error: no command was given\nhint: grassfire reconstruct part.stl -o out\n"
+        )
+    );
 }
 
 #[test]
@@ -150,7 +158,10 @@ fn unknown_setting_names_the_nearest() {
     hint: for example --set remesh.min_tunnel=0
     ");
     let text = refused(&["reconstruct", "part.stl", "--set", "remesh.voxel=thick"]);
-    assert!(text.starts_with("error: --set remesh.voxel=thick: invalid type"), "{text}");
+    assert!(
+        text.starts_with("error: --set remesh.voxel=thick: invalid type"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -162,7 +173,11 @@ fn missing_and_empty_files_are_refused_in_one_line() {
         let text = refused(&["reconstruct", &part]);
         assert!(text.starts_with("error: "), "{text}");
         assert!(text.contains(&part), "{text}");
-        assert!(text.lines().all(|line| line.starts_with("error: ") || line.starts_with("hint: ")), "{text}");
+        assert!(
+            text.lines()
+                .all(|line| line.starts_with("error: ") || line.starts_with("hint: ")),
+            "{text}"
+        );
     }
 }
 
@@ -185,7 +200,10 @@ fn about_cites() {
 #[test]
 fn completions_and_manual() {
     for shell in ["bash", "zsh", "fish"] {
-        assert!(stdout(&grassfire(&["completions", shell])).contains("reconstruct"), "{shell}");
+        assert!(
+            stdout(&grassfire(&["completions", shell])).contains("reconstruct"),
+            "{shell}"
+        );
     }
     assert!(stdout(&grassfire(&["man"])).starts_with(".ie"));
 }

@@ -170,4 +170,22 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
 /// Name of the product in the STEP file: the proposal's file name.
 fn product_name(part: &Path) -> String {
     part.file_stem().map_or_else(|| "part".to_owned(), |stem| stem.to_string_lossy().into_owned())
+    monitor.step("input", "reading", 0.0)?;
+    let refuse = |source| PipelineError::Input {
+        stage: "input",
+        source,
+        hint: None,
+    };
+    let bytes = std::fs::read(&job.part)
+        .map_err(|e| refuse(format!("{}: {e}", job.part.display()).into()))?;
+    if bytes.is_empty() {
+        return Err(refuse(
+            format!("{}: the file is empty", job.part.display()).into(),
+        ));
+    }
+    Err(PipelineError::Solver {
+        stage: "remesh",
+        source: "the stages are not joined yet".into(),
+        hint: None,
+    })
 }

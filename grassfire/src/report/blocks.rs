@@ -135,7 +135,11 @@ pub struct TopologyChangeEntry {
 
 impl From<&TopologyChange> for TopologyChangeEntry {
     fn from(change: &TopologyChange) -> Self {
-        Self { kind: change.kind, place: change.place.into(), size: change.size }
+        Self {
+            kind: change.kind,
+            place: change.place.into(),
+            size: change.size,
+        }
     }
 }
 

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 use super::Report;
 use crate::topology::Betti;
 
+/// Unit of checks that count what is wrong.
+const DEFECTS: &str = "defects";
+
 /// What a result must keep to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -42,14 +45,14 @@ impl Default for Limits {
 pub struct Check {
     /// Key in `report.json`, such as `solid.valid`.
     pub name: String,
-    /// What is checked, in words.
+    /// What must hold, in words.
     pub text: String,
     /// The measured value; absent when it could not be measured, and then the check is not met.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
     /// Largest value allowed (equality is allowed).
     pub limit: f64,
-    /// Unit of both; empty for counts.
+    /// Unit of both; `defects` for counts of what is wrong, empty for ratios.
     pub unit: String,
     /// The verdict.
     pub met: bool,
@@ -63,7 +66,13 @@ pub fn judge(report: &Report, limits: &Limits) -> Vec<Check> {
     topology(report, &mut checks);
     if let Some(body) = &report.body {
         let crossings = body.self_intersections as f64;
-        checks.push(check("body.self_intersections", "Faces of the body that cut each other", crossings, 0.0, ""));
+        checks.push(check(
+            "body.self_intersections",
+            "Body does not cut itself",
+            crossings,
+            0.0,
+            DEFECTS,
+        ));
     }
     solid(report, limits, &mut checks);
     fidelity(report, limits, &mut checks);
@@ -73,24 +82,33 @@ pub fn judge(report: &Report, limits: &Limits) -> Vec<Check> {
 fn check(name: &str, text: &str, value: f64, limit: f64, unit: &str) -> Check {
     let value = value.is_finite().then_some(value);
     let met = value.is_some_and(|v| v <= limit);
-    Check { name: name.to_owned(), text: text.to_owned(), value, limit, unit: unit.to_owned(), met }
+    Check {
+        name: name.to_owned(),
+        text: text.to_owned(),
+        value,
+        limit,
+        unit: unit.to_owned(),
+        met,
+    }
 }
 
 fn defect(name: &str, text: &str, bad: bool) -> Check {
-    check(name, text, f64::from(u8::from(bad)), 0.0, "")
+    check(name, text, f64::from(u8::from(bad)), 0.0, DEFECTS)
 }
 
 fn topology(report: &Report, checks: &mut Vec<Check>) {
-    let Some(topology) = &report.topology else { return };
+    let Some(topology) = &report.topology else {
+        return;
+    };
     let differs = |other: Betti| topology.solid != other;
     checks.push(defect(
         "topology.complex",
-        "Topology of the medial complex differs from the solid",
+        "Medial complex has the topology of the solid",
         differs(topology.complex),
     ));
     checks.push(defect(
         "topology.skeleton",
-        "Topology of the skeleton differs from the solid",
+        "Skeleton has the topology of the solid",
         differs(topology.skeleton),
     ));
     if topology.body.is_empty() {
@@ -98,44 +116,112 @@ fn topology(report: &Report, checks: &mut Vec<Check>) {
     }
     let chi: i64 = topology.body.iter().map(|surface| surface.chi).sum();
     let off = (chi - 2 * topology.skeleton.chi).unsigned_abs() as f64;
-    checks.push(check("topology.body", "Euler number of the body minus twice that of the skeleton", off, 0.0, ""));
-    let open = topology.body.iter().filter(|surface| !surface.closed || !surface.manifold).count();
-    checks.push(check("topology.body.closed", "Body surfaces that are open or not manifold", open as f64, 0.0, ""));
+    checks.push(check(
+        "topology.body",
+        "Body surface has twice the Euler number of the skeleton",
+        off,
+        0.0,
+        DEFECTS,
+    ));
+    let open = topology
+        .body
+        .iter()
+        .filter(|surface| !surface.closed || !surface.manifold)
+        .count();
+    checks.push(check(
+        "topology.body.closed",
+        "Body surfaces are closed and manifold",
+        open as f64,
+        0.0,
+        DEFECTS,
+    ));
 }
 
 fn solid(report: &Report, limits: &Limits, checks: &mut Vec<Check>) {
     let Some(solid) = &report.solid else { return };
-    checks.push(defect("solid.valid", "The CAD kernel calls the solid invalid", !solid.valid));
+    checks.push(defect(
+        "solid.valid",
+        "Solid is valid for the CAD kernel",
+        !solid.valid,
+    ));
     let pieces = report.topology.as_ref().map_or(1, |t| t.solid.b0.max(1)) as f64;
-    checks.push(check("solid.bodies", "Separate bodies, at most those of the proposal", solid.bodies as f64, pieces, ""));
+    checks.push(check(
+        "solid.bodies",
+        "Separate bodies, no more than the proposal has",
+        solid.bodies as f64,
+        pieces,
+        "",
+    ));
     if solid.bodies == 0 {
-        checks.push(defect("solid.empty", "The solid is empty", true));
+        checks.push(defect("solid.empty", "Solid has a body", true));
     }
-    checks.push(check("solid.g1_max", "Largest kink across smooth edges", solid.g1_max, limits.g1, "°"));
+    checks.push(check(
+        "solid.g1_max",
+        "Largest kink across smooth edges",
+        solid.g1_max,
+        limits.g1,
+        "°",
+    ));
     let volume_check = solid.volume_check.abs();
     let text = "Volume by the CAD kernel against ours, relative";
-    checks.push(check("solid.volume_check", text, volume_check, limits.volume_check, ""));
+    checks.push(check(
+        "solid.volume_check",
+        text,
+        volume_check,
+        limits.volume_check,
+        "",
+    ));
 }
 
 fn fidelity(report: &Report, limits: &Limits, checks: &mut Vec<Check>) {
     if let Some(distance) = &report.distance {
         let voxels = |mm: f64| mm / distance.voxel;
         let rms = voxels(distance.rms);
-        checks.push(check("distance.rms", "Distance to the proposal, rms", rms, limits.distance_rms, "voxels"));
+        checks.push(check(
+            "distance.rms",
+            "Distance to the proposal, rms",
+            rms,
+            limits.distance_rms,
+            "voxels",
+        ));
         let p95 = voxels(distance.p95);
-        checks.push(check("distance.p95", "Distance to the proposal, 95 %", p95, limits.distance_p95, "voxels"));
+        checks.push(check(
+            "distance.p95",
+            "Distance to the proposal, 95 %",
+            p95,
+            limits.distance_p95,
+            "voxels",
+        ));
         if let Some(mm) = distance.non_design_max {
             let text = "Non-design faces against the given bodies";
-            checks.push(check("distance.non_design_max", text, mm, limits.non_design, "mm"));
+            checks.push(check(
+                "distance.non_design_max",
+                text,
+                mm,
+                limits.non_design,
+                "mm",
+            ));
         }
     }
     if let Some(volume) = &report.volume {
         let percent = 100.0 * volume.relative_difference.abs();
         let limit = 100.0 * limits.volume;
-        checks.push(check("volume.relative_difference", "Volume against the proposal", percent, limit, "%"));
+        checks.push(check(
+            "volume.relative_difference",
+            "Volume against the proposal",
+            percent,
+            limit,
+            "%",
+        ));
     }
     let lost = report.non_design.iter().filter(|body| !body.kept).count();
     if !report.non_design.is_empty() {
-        checks.push(check("non_design.kept", "Non-design bodies not kept as given", lost as f64, 0.0, ""));
+        checks.push(check(
+            "non_design.kept",
+            "Non-design bodies are in the solid as given",
+            lost as f64,
+            0.0,
+            DEFECTS,
+        ));
     }
 }

@@ -6,8 +6,8 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::format::{bytes, count, number, with_unit};
 use super::{
-    BodyBlock, Check, DistanceBlock, InputBlock, NonDesignBlock, Picture, RemeshBlock, Report, SkeletonBlock,
-    SolidBlock, TopologyBlock, TopologyChangeEntry, papers,
+    BodyBlock, Check, DistanceBlock, InputBlock, NonDesignBlock, Picture, RemeshBlock, Report,
+    SkeletonBlock, SolidBlock, TopologyBlock, TopologyChangeEntry, papers,
 };
 use crate::remesh::ChangeKind;
 use crate::topology::Betti;
@@ -51,7 +51,10 @@ pub fn to_html(report: &Report, pictures: &[Picture]) -> String {
 }
 
 fn part_name(report: &Report) -> String {
-    let path = report.inputs.first().map_or("part", |input| input.path.as_str());
+    let path = report
+        .inputs
+        .first()
+        .map_or("part", |input| input.path.as_str());
     path.rsplit(['/', '\\']).next().unwrap_or(path).to_owned()
 }
 
@@ -228,7 +231,11 @@ fn change_name(kind: ChangeKind) -> &'static str {
 }
 
 fn topology(block: &TopologyBlock) -> Markup {
-    let rows = [("Solid (voxels)", block.solid), ("Medial complex", block.complex), ("Skeleton", block.skeleton)];
+    let rows = [
+        ("Solid (voxels)", block.solid),
+        ("Medial complex", block.complex),
+        ("Skeleton", block.skeleton),
+    ];
     html! {
         h2 { "Topology" }
         p .soft { "Solid, complex and skeleton must agree; the closed surface of the body has twice their Euler number." }
@@ -313,11 +320,21 @@ fn solid(block: &SolidBlock) -> Markup {
 }
 
 fn fidelity(report: &Report) -> Markup {
-    let mut rows = report.distance.as_ref().map(distance_rows).unwrap_or_default();
+    let mut rows = report
+        .distance
+        .as_ref()
+        .map(distance_rows)
+        .unwrap_or_default();
     if let Some(volume) = &report.volume {
-        rows.push(("Volume of the proposal", with_unit(volume.proposal, 5, "mm³")));
+        rows.push((
+            "Volume of the proposal",
+            with_unit(volume.proposal, 5, "mm³"),
+        ));
         rows.push(("Volume of the solid", with_unit(volume.solid, 5, "mm³")));
-        rows.push(("Relative difference", with_unit(100.0 * volume.relative_difference, 3, "%")));
+        rows.push((
+            "Relative difference",
+            with_unit(100.0 * volume.relative_difference, 3, "%"),
+        ));
     }
     if rows.is_empty() {
         return html! {};
@@ -330,14 +347,23 @@ fn fidelity(report: &Report) -> Markup {
 }
 
 fn distance_rows(block: &DistanceBlock) -> Vec<(&'static str, String)> {
-    let both = |mm: f64| format!("{} ({})", with_unit(mm, 3, "mm"), with_unit(mm / block.voxel, 3, "voxels"));
+    let both = |mm: f64| {
+        format!(
+            "{} ({})",
+            with_unit(mm, 3, "mm"),
+            with_unit(mm / block.voxel, 3, "voxels")
+        )
+    };
     let mut rows = vec![
         ("Distance, rms", both(block.rms)),
         ("Distance, 95 %", both(block.p95)),
         ("Distance, largest", both(block.max)),
     ];
     if let Some(mm) = block.non_design_max {
-        rows.push(("Non-design faces to the given bodies, largest", with_unit(mm, 3, "mm")));
+        rows.push((
+            "Non-design faces to the given bodies, largest",
+            with_unit(mm, 3, "mm"),
+        ));
     }
     rows
 }
@@ -367,7 +393,11 @@ fn stages(report: &Report) -> Markup {
     if report.stages.is_empty() {
         return html! {};
     }
-    let longest = report.stages.iter().map(|stage| stage.seconds).fold(1e-9, f64::max);
+    let longest = report
+        .stages
+        .iter()
+        .map(|stage| stage.seconds)
+        .fold(1e-9, f64::max);
     html! {
         h2 { "Stages" }
         div .scroll { table {
@@ -400,7 +430,11 @@ fn files(report: &Report) -> Markup {
 }
 
 fn citations(report: &Report) -> Markup {
-    let used: Vec<_> = report.papers.iter().filter_map(|key| papers::find(key)).collect();
+    let used: Vec<_> = report
+        .papers
+        .iter()
+        .filter_map(|key| papers::find(key))
+        .collect();
     if used.is_empty() {
         return html! {};
     }

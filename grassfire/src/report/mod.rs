@@ -18,9 +18,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 pub use blocks::{
-    BodyBlock, CornerDeviation, DistanceBlock, FileEntry, InputBlock, InputFile, NonDesignBlock, RadiusRange,
-    RemeshBlock, RepairEntry, Report, SkeletonBlock, SolidBlock, StageEntry, TopologyBlock, TopologyChangeEntry,
-    VolumeBlock,
+    BodyBlock, CornerDeviation, DistanceBlock, FileEntry, InputBlock, InputFile, NonDesignBlock,
+    RadiusRange, RemeshBlock, RepairEntry, Report, SkeletonBlock, SolidBlock, StageEntry,
+    TopologyBlock, TopologyChangeEntry, VolumeBlock,
 };
 pub use checks::{Check, Limits, judge};
 pub use html::to_html;
@@ -41,7 +41,11 @@ pub struct ReportOptions {
 
 impl Default for ReportOptions {
     fn default() -> Self {
-        Self { pictures: true, picture_width: 1000, limits: Limits::default() }
+        Self {
+            pictures: true,
+            picture_width: 1000,
+            limits: Limits::default(),
+        }
     }
 }
 
@@ -49,7 +53,10 @@ impl ReportOptions {
     /// Size of all pictures.
     pub fn picture_size(&self) -> PictureSize {
         let width = self.picture_width.clamp(64, render::MAX_SIZE);
-        PictureSize { width, height: width * 3 / 4 }
+        PictureSize {
+            width,
+            height: width * 3 / 4,
+        }
     }
 }
 
@@ -87,8 +94,12 @@ impl ReportError {
     /// What the user can do about it.
     pub fn hint(&self) -> Option<String> {
         match self {
-            Self::Write { .. } => Some("choose a folder that you may write to with -o DIR".to_owned()),
-            Self::Render(_) => Some("set report.pictures=false or another report.picture_width".to_owned()),
+            Self::Write { .. } => {
+                Some("choose a folder that you may write to with -o DIR".to_owned())
+            }
+            Self::Render(_) => {
+                Some("set report.pictures=false or another report.picture_width".to_owned())
+            }
             Self::Json(_) => None,
         }
     }
@@ -123,12 +134,19 @@ pub fn write_html(path: &Path, report: &Report, pictures: &[Picture]) -> Result<
 }
 
 fn write(path: &Path, text: &str) -> Result<(), ReportError> {
-    std::fs::write(path, text).map_err(|source| ReportError::Write { path: path.to_owned(), source })
+    std::fs::write(path, text).map_err(|source| ReportError::Write {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 /// serde_json writes NaN and infinity as null: a list with one of them is not usable, so its key goes too.
 fn drop_null(value: &mut Value) {
-    let broken = |v: &Value| v.is_null() || v.as_array().is_some_and(|list| list.iter().any(Value::is_null));
+    let broken = |v: &Value| {
+        v.is_null()
+            || v.as_array()
+                .is_some_and(|list| list.iter().any(Value::is_null))
+    };
     match value {
         Value::Object(map) => {
             map.retain(|_, v| !broken(v));

@@ -148,7 +148,9 @@ pub const ALL: &[Paper] = &[
 /// The papers behind `stages`, in the order of [`ALL`].
 pub fn of_stages<'a>(stages: impl IntoIterator<Item = &'a str>) -> Vec<&'static Paper> {
     let names: Vec<&str> = stages.into_iter().collect();
-    ALL.iter().filter(|paper| paper.stages.iter().any(|stage| names.contains(stage))).collect()
+    ALL.iter()
+        .filter(|paper| paper.stages.iter().any(|stage| names.contains(stage)))
+        .collect()
 }
 
 /// The paper with `key`.
@@ -166,14 +168,25 @@ mod tests {
         let entries = bib.lines().filter(|line| line.starts_with('@')).count();
         assert_eq!(entries, ALL.len());
         for paper in ALL {
-            assert!(bib.contains(&format!("{{{},", paper.key)), "{} is missing", paper.key);
-            assert!(paper.doi.is_empty() || bib.contains(&format!("{{{}}}", paper.doi)), "{}", paper.doi);
+            assert!(
+                bib.contains(&format!("{{{},", paper.key)),
+                "{} is missing",
+                paper.key
+            );
+            assert!(
+                paper.doi.is_empty() || bib.contains(&format!("{{{}}}", paper.doi)),
+                "{}",
+                paper.doi
+            );
         }
     }
 
     #[test]
     fn stages_pick_their_papers() {
-        let keys: Vec<&str> = of_stages(["spline"]).iter().map(|paper| paper.key).collect();
+        let keys: Vec<&str> = of_stages(["spline"])
+            .iter()
+            .map(|paper| paper.key)
+            .collect();
         assert_eq!(keys, ["loop2008", "eppstein2008"]);
         assert!(find("yan2018").is_some() && find("nobody").is_none());
     }

@@ -28,7 +28,11 @@ impl Camera {
     ///
     /// Points that are not finite are ignored; without points the camera looks at a unit cube.
     pub fn fit(points: &[Vec3]) -> Self {
-        let finite: Vec<Vec3> = points.iter().filter(|p| p.iter().all(|x| x.is_finite())).copied().collect();
+        let finite: Vec<Vec3> = points
+            .iter()
+            .filter(|p| p.iter().all(|x| x.is_finite()))
+            .copied()
+            .collect();
         let mut best: Option<(f64, Self)> = None;
         for azimuth in AZIMUTHS {
             let camera = Self::looking(&finite, azimuth, ELEVATION);
@@ -37,7 +41,10 @@ impl Camera {
                 best = Some((need, camera));
             }
         }
-        best.map_or_else(|| Self::looking(&finite, AZIMUTHS[0], ELEVATION), |(_, camera)| camera)
+        best.map_or_else(
+            || Self::looking(&finite, AZIMUTHS[0], ELEVATION),
+            |(_, camera)| camera,
+        )
     }
 
     /// Looks at `points` from `azimuth` degrees around z (0 is +x) and `elevation` degrees above the xy plane.
@@ -46,8 +53,14 @@ impl Camera {
         let toward = Vec3::new(el.cos() * az.cos(), el.cos() * az.sin(), el.sin());
         let right = Vec3::new(-az.sin(), az.cos(), 0.0);
         let up = toward.cross(&right);
-        let mut camera =
-            Self { right, up, toward, centre: Vec3::zeros(), half: [1.0; 2], reach: 1.0 };
+        let mut camera = Self {
+            right,
+            up,
+            toward,
+            centre: Vec3::zeros(),
+            half: [1.0; 2],
+            reach: 1.0,
+        };
         let mut low = Vec3::repeat(f64::INFINITY);
         let mut high = Vec3::repeat(f64::NEG_INFINITY);
         for p in points {
@@ -78,7 +91,11 @@ mod tests {
 
     #[test]
     fn keeps_all_points_inside() {
-        let points = [Vec3::zeros(), Vec3::new(100.0, 3.0, 7.0), Vec3::new(20.0, -50.0, 1.0)];
+        let points = [
+            Vec3::zeros(),
+            Vec3::new(100.0, 3.0, 7.0),
+            Vec3::new(20.0, -50.0, 1.0),
+        ];
         let camera = Camera::fit(&points);
         for p in &points {
             let q = camera.project(p);

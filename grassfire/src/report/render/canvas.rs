@@ -30,7 +30,12 @@ impl Canvas {
             let Some(glyph) = glyph else { continue };
             for (row, line) in glyph.rows().enumerate() {
                 for (column, &alpha) in line.iter().enumerate() {
-                    self.blend(x + n as i64 * advance + column as i64, y + row as i64, colour, alpha);
+                    self.blend(
+                        x + n as i64 * advance + column as i64,
+                        y + row as i64,
+                        colour,
+                        alpha,
+                    );
                 }
             }
         }
@@ -47,7 +52,8 @@ impl Canvas {
         }
         let pixel = &mut self.pixels[y as usize * self.width + x as usize];
         for (old, new) in pixel.iter_mut().zip(colour) {
-            let mix = u32::from(*old) * (255 - u32::from(alpha)) + u32::from(new) * u32::from(alpha);
+            let mix =
+                u32::from(*old) * (255 - u32::from(alpha)) + u32::from(new) * u32::from(alpha);
             *old = ((mix + 127) / 255) as u8;
         }
     }

@@ -44,7 +44,7 @@ pub struct Legend {
 
 const TEXT: Rgb = [60, 64, 70];
 const BAR_WIDTH: i64 = 18;
-const RIGHT_MARGIN: i64 = 92;
+const RIGHT_MARGIN: i64 = 106;
 
 impl Legend {
     /// A scale over the middle 96 % of `values`, so that a few outliers do not wash out the rest; 0..1 when none is
@@ -52,18 +52,32 @@ impl Legend {
     pub fn spanning(title: &str, values: &[f64], map: ColourMap) -> Self {
         let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
-        let pick = |share: f64| sorted.get(((sorted.len().max(1) - 1) as f64 * share).round() as usize).copied();
+        let pick = |share: f64| {
+            sorted
+                .get(((sorted.len().max(1) - 1) as f64 * share).round() as usize)
+                .copied()
+        };
         let low = pick(0.02).unwrap_or(0.0);
         let mut high = pick(0.98).unwrap_or(1.0);
         if high - low <= 1e-9 * high.abs().max(low.abs()) {
             high = low + low.abs().max(1.0) * 0.1;
         }
-        Self { title: title.to_owned(), low, high, map }
+        Self {
+            title: title.to_owned(),
+            low,
+            high,
+            map,
+        }
     }
 
     /// A scale from `-limit` to `limit`.
     pub fn symmetric(title: &str, limit: f64) -> Self {
-        Self { title: title.to_owned(), low: -limit, high: limit, map: ColourMap::BlueRed }
+        Self {
+            title: title.to_owned(),
+            low: -limit,
+            high: limit,
+            map: ColourMap::BlueRed,
+        }
     }
 
     /// Colour of `value`.
@@ -83,10 +97,22 @@ impl Legend {
             let t = (value - self.low) / (self.high - self.low);
             let y = top + ((1.0 - t) * (bar_height - 1) as f64).round() as i64;
             canvas.fill(x + BAR_WIDTH, y, 5, 1, TEXT);
-            canvas.text(x + BAR_WIDTH + 9, y - 11, &tick_label(value, self.low, self.high), RasterHeight::Size20, TEXT);
+            canvas.text(
+                x + BAR_WIDTH + 9,
+                y - 13,
+                &tick_label(value, self.low, self.high),
+                RasterHeight::Size24,
+                TEXT,
+            );
         }
-        let title_x = (width - 16 - Canvas::text_width(&self.title, RasterHeight::Size20)).min(x);
-        canvas.text(title_x.max(0), top - 38, &self.title, RasterHeight::Size20, TEXT);
+        let title_x = (width - 16 - Canvas::text_width(&self.title, RasterHeight::Size24)).min(x);
+        canvas.text(
+            title_x.max(0),
+            top - 44,
+            &self.title,
+            RasterHeight::Size24,
+            TEXT,
+        );
     }
 }
 
@@ -97,13 +123,19 @@ fn ticks(low: f64, high: f64) -> Vec<f64> {
         return Vec::new();
     }
     let first = (low / step - 1e-6).ceil();
-    (0..12).map(|n| (first + f64::from(n)) * step).take_while(|v| *v <= high + 1e-6 * step).collect()
+    (0..12)
+        .map(|n| (first + f64::from(n)) * step)
+        .take_while(|v| *v <= high + 1e-6 * step)
+        .collect()
 }
 
 fn tick_step(low: f64, high: f64) -> f64 {
     let rough = (high - low) / 4.0;
     let decade = 10f64.powf(rough.log10().floor());
-    let factor = [1.0, 2.0, 2.5, 5.0, 10.0].into_iter().find(|f| f * decade >= rough * 0.999).unwrap_or(10.0);
+    let factor = [1.0, 2.0, 2.5, 5.0, 10.0]
+        .into_iter()
+        .find(|f| f * decade >= rough * 0.999)
+        .unwrap_or(10.0);
     factor * decade
 }
 
@@ -118,7 +150,11 @@ fn tick_label(value: f64, low: f64, high: f64) -> String {
     if (scaled - scaled.round()).abs() > 1e-6 {
         decimals += 1;
     }
-    let value = if value.abs() < step * 1e-6 { 0.0 } else { value };
+    let value = if value.abs() < step * 1e-6 {
+        0.0
+    } else {
+        value
+    };
     format!("{value:.decimals$}")
 }
 
@@ -128,10 +164,20 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_inside() {
-        for (low, high) in [(0.0, 1.0), (-1.0, 1.0), (0.73, 9.2), (1234.0, 98765.0), (1e-7, 3e-7)] {
+        for (low, high) in [
+            (0.0, 1.0),
+            (-1.0, 1.0),
+            (0.73, 9.2),
+            (1234.0, 98765.0),
+            (1e-7, 3e-7),
+        ] {
             let values = ticks(low, high);
             assert!((3..=7).contains(&values.len()), "{low} {high}: {values:?}");
-            assert!(values.iter().all(|v| *v >= low - 1e-6 * (high - low) && *v <= high + 1e-6 * (high - low)));
+            assert!(
+                values
+                    .iter()
+                    .all(|v| *v >= low - 1e-6 * (high - low) && *v <= high + 1e-6 * (high - low))
+            );
         }
         assert_eq!(tick_label(0.25, 0.0, 1.0), "0.25");
         assert_eq!(tick_label(2.0, 0.0, 8.0), "2");

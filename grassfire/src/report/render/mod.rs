@@ -52,7 +52,10 @@ pub struct PictureSize {
 
 impl Default for PictureSize {
     fn default() -> Self {
-        Self { width: 1000, height: 750 }
+        Self {
+            width: 1000,
+            height: 750,
+        }
     }
 }
 
@@ -66,7 +69,11 @@ pub fn render(scene: &Scene, camera: &Camera, size: PictureSize) -> Result<Vec<u
         return Err(RenderError::Size { width, height });
     }
     let image = raster::draw(scene, camera, width as usize, height as usize);
-    let mut canvas = Canvas { width: width as usize, height: height as usize, pixels: image };
+    let mut canvas = Canvas {
+        width: width as usize,
+        height: height as usize,
+        pixels: image,
+    };
     if let Some(legend) = &scene.legend {
         legend.draw(&mut canvas);
     }

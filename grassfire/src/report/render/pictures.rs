@@ -2,7 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::{Camera, ColourMap, Colours, Legend, PictureSize, RenderError, Rgb, Scene, SceneMesh, Shading, render};
+use super::{
+    Camera, ColourMap, Colours, Legend, PictureSize, RenderError, Rgb, Scene, SceneMesh, Shading,
+    render,
+};
 use crate::Vec3;
 use crate::medial::MedialMesh;
 use crate::mesh::TriMesh;
@@ -31,27 +34,52 @@ pub struct Studio {
 impl Studio {
     /// Chooses the camera for a part by its points.
     pub fn new(points: &[Vec3], size: PictureSize) -> Self {
-        Self { camera: Camera::fit(points), size }
+        Self {
+            camera: Camera::fit(points),
+            size,
+        }
     }
 
     fn shoot(&self, scene: &Scene, title: &str, caption: &str) -> Result<Picture, RenderError> {
         let png = render(scene, &self.camera, self.size)?;
-        Ok(Picture { title: title.to_owned(), caption: caption.to_owned(), png })
+        Ok(Picture {
+            title: title.to_owned(),
+            caption: caption.to_owned(),
+            png,
+        })
     }
 
     /// The remeshed proposal.
     pub fn proposal(&self, mesh: &TriMesh) -> Result<Picture, RenderError> {
-        let scene = Scene { meshes: vec![smooth(mesh)], ..Scene::default() };
-        self.shoot(&scene, "Proposal", "The cleaned, closed proposal after the voxel remesh.")
+        let scene = Scene {
+            meshes: vec![smooth(mesh)],
+            ..Scene::default()
+        };
+        self.shoot(
+            &scene,
+            "Proposal",
+            "The cleaned, closed proposal after the voxel remesh.",
+        )
     }
 
     /// Wall thickness: `thickness` has one value in mm a point.
     pub fn thickness(&self, mesh: &TriMesh, thickness: &[f64]) -> Result<Picture, RenderError> {
         let legend = Legend::spanning("thickness, mm", thickness, ColourMap::Viridis);
         let colours = thickness.iter().map(|t| legend.colour(*t)).collect();
-        let mesh = SceneMesh { colours: Colours::Points(colours), ..smooth(mesh) };
-        let scene = Scene { meshes: vec![mesh], legend: Some(legend), ..Scene::default() };
-        self.shoot(&scene, "Wall thickness", "Twice the distance from the surface to the medial axis.")
+        let mesh = SceneMesh {
+            colours: Colours::Points(colours),
+            ..smooth(mesh)
+        };
+        let scene = Scene {
+            meshes: vec![mesh],
+            legend: Some(legend),
+            ..Scene::default()
+        };
+        self.shoot(
+            &scene,
+            "Wall thickness",
+            "Twice the distance from the surface to the medial axis.",
+        )
     }
 
     /// The medial axis: sheets coloured by radius, curves red.
@@ -64,9 +92,17 @@ impl Studio {
             colours: Colours::Points(colours),
             shading: Shading::Smooth(CREASE),
         };
-        let mut scene = Scene { meshes: vec![mesh], legend: Some(legend), ..Scene::default() };
+        let mut scene = Scene {
+            meshes: vec![mesh],
+            legend: Some(legend),
+            ..Scene::default()
+        };
         scene.add_edges(&medial.points, &medial.edges, BEAM, 2.5);
-        self.shoot(&scene, "Medial axis", "Sheets coloured by the radius of the inscribed sphere; curves red.")
+        self.shoot(
+            &scene,
+            "Medial axis",
+            "Sheets coloured by the radius of the inscribed sphere; curves red.",
+        )
     }
 
     /// The quad skeleton: rims black, seams magenta, beams red, quads coloured by radius.
@@ -77,7 +113,11 @@ impl Studio {
             colours: Colours::Points(colours),
             ..SceneMesh::quads(&skeleton.points, &skeleton.quads, STEEL)
         };
-        let mut scene = Scene { meshes: vec![mesh], legend: Some(legend), ..Scene::default() };
+        let mut scene = Scene {
+            meshes: vec![mesh],
+            legend: Some(legend),
+            ..Scene::default()
+        };
         for (edge, uses) in quad_edges(&skeleton.quads) {
             let (colour, width) = match uses {
                 1 => (RIM, 2.5),
@@ -93,24 +133,48 @@ impl Studio {
 
     /// The thickened body: control mesh with its quad edges.
     pub fn body(&self, body: &ControlMesh) -> Result<Picture, RenderError> {
-        let mesh = SceneMesh { shading: Shading::Flat, ..SceneMesh::quads(&body.points, &body.quads, STEEL) };
-        let mut scene = Scene { meshes: vec![mesh], ..Scene::default() };
+        let mesh = SceneMesh {
+            shading: Shading::Flat,
+            ..SceneMesh::quads(&body.points, &body.quads, STEEL)
+        };
+        let mut scene = Scene {
+            meshes: vec![mesh],
+            ..Scene::default()
+        };
         let edges: Vec<[u32; 2]> = quad_edges(&body.quads).into_keys().collect();
         scene.add_edges(&body.points, &edges, EDGE, 1.2);
-        self.shoot(&scene, "Body", "Control mesh of the thickened and fitted body.")
+        self.shoot(
+            &scene,
+            "Body",
+            "Control mesh of the thickened and fitted body.",
+        )
     }
 
     /// The final solid with its face borders. `mesh.tags` holds the face of every triangle; faces in `non_design` are
     /// drawn in another colour.
     pub fn solid(&self, mesh: &TriMesh, non_design: &[u32]) -> Result<Picture, RenderError> {
         let given: std::collections::BTreeSet<u32> = non_design.iter().copied().collect();
-        let colour = |t: usize| if mesh.tags.get(t).is_some_and(|f| given.contains(f)) { SAND } else { STEEL };
+        let colour = |t: usize| {
+            if mesh.tags.get(t).is_some_and(|f| given.contains(f)) {
+                SAND
+            } else {
+                STEEL
+            }
+        };
         let colours = Colours::Triangles((0..mesh.triangles.len()).map(colour).collect());
-        let mut scene = Scene { meshes: vec![SceneMesh { colours, ..smooth(mesh) }], ..Scene::default() };
+        let mut scene = Scene {
+            meshes: vec![SceneMesh {
+                colours,
+                ..smooth(mesh)
+            }],
+            ..Scene::default()
+        };
         scene.add_edges(&mesh.points, &face_borders(mesh), EDGE, 1.2);
         let caption = match non_design.is_empty() {
             true => "The CAD solid with the borders of its faces.",
-            false => "The CAD solid with the borders of its faces; non-design bodies sand-coloured.",
+            false => {
+                "The CAD solid with the borders of its faces; non-design bodies sand-coloured."
+            }
         };
         self.shoot(&scene, "Solid", caption)
     }
@@ -119,8 +183,15 @@ impl Studio {
     pub fn error(&self, mesh: &TriMesh, voxels: &[f64]) -> Result<Picture, RenderError> {
         let legend = Legend::symmetric("distance, voxels", 1.0);
         let colours = voxels.iter().map(|d| legend.colour(*d)).collect();
-        let mesh = SceneMesh { colours: Colours::Points(colours), ..smooth(mesh) };
-        let scene = Scene { meshes: vec![mesh], legend: Some(legend), ..Scene::default() };
+        let mesh = SceneMesh {
+            colours: Colours::Points(colours),
+            ..smooth(mesh)
+        };
+        let scene = Scene {
+            meshes: vec![mesh],
+            legend: Some(legend),
+            ..Scene::default()
+        };
         let caption = "Distance from the solid to the proposal: red outside it, blue inside it.";
         self.shoot(&scene, "Deviation", caption)
     }
@@ -154,7 +225,10 @@ fn face_borders(mesh: &TriMesh) -> Vec<[u32; 2]> {
     }
     edges.sort_unstable();
     let same_edge = edges.chunk_by(|a, b| a.0 == b.0);
-    same_edge.filter(|uses| uses.len() == 1 || uses[0].1 != uses[uses.len() - 1].1).map(|uses| uses[0].0).collect()
+    same_edge
+        .filter(|uses| uses.len() == 1 || uses[0].1 != uses[uses.len() - 1].1)
+        .map(|uses| uses[0].0)
+        .collect()
 }
 
 #[cfg(test)]
@@ -162,8 +236,14 @@ mod tests {
     use super::*;
 
     fn square() -> TriMesh {
-        let points = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec();
-        TriMesh { points, triangles: vec![[0, 1, 2], [0, 2, 3]], tags: vec![0, 1] }
+        let points = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+            .map(|[x, y]| Vec3::new(x, y, 0.0))
+            .to_vec();
+        TriMesh {
+            points,
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            tags: vec![0, 1],
+        }
     }
 
     #[test]
@@ -177,12 +257,28 @@ mod tests {
     #[test]
     fn every_view_gives_a_png() {
         let mesh = square();
-        let size = PictureSize { width: 64, height: 48 };
+        let size = PictureSize {
+            width: 64,
+            height: 48,
+        };
         let studio = Studio::new(&mesh.points, size);
         let (points, radii) = (mesh.points.clone(), vec![1.0; 4]);
-        let medial = MedialMesh { points: points.clone(), radii: radii.clone(), edges: vec![[0, 1]], triangles: vec![[0, 1, 2]] };
-        let skeleton = Skeleton { points: points.clone(), radii, quads: vec![[0, 1, 2, 3]], beams: vec![[0, 2]] };
-        let body = ControlMesh { points, quads: vec![[0, 1, 2, 3]] };
+        let medial = MedialMesh {
+            points: points.clone(),
+            radii: radii.clone(),
+            edges: vec![[0, 1]],
+            triangles: vec![[0, 1, 2]],
+        };
+        let skeleton = Skeleton {
+            points: points.clone(),
+            radii,
+            quads: vec![[0, 1, 2, 3]],
+            beams: vec![[0, 2]],
+        };
+        let body = ControlMesh {
+            points,
+            quads: vec![[0, 1, 2, 3]],
+        };
         let pictures = [
             studio.proposal(&mesh),
             studio.thickness(&mesh, &[1.0, 2.0, f64::NAN]),
@@ -199,21 +295,48 @@ mod tests {
 
     #[test]
     fn bad_indices_and_empty_meshes_are_left_out() {
-        let mesh = TriMesh { points: vec![Vec3::repeat(f64::NAN)], triangles: vec![[0, 0, 0], [7, 8, 9]], tags: vec![] };
-        let studio = Studio::new(&mesh.points, PictureSize { width: 32, height: 32 });
+        let mesh = TriMesh {
+            points: vec![Vec3::repeat(f64::NAN)],
+            triangles: vec![[0, 0, 0], [7, 8, 9]],
+            tags: vec![],
+        };
+        let studio = Studio::new(
+            &mesh.points,
+            PictureSize {
+                width: 32,
+                height: 32,
+            },
+        );
         assert!(studio.proposal(&mesh).is_ok());
         assert!(studio.proposal(&TriMesh::default()).is_ok());
-        let too_big = Studio { size: PictureSize { width: 99_999, height: 1 }, ..studio };
+        let too_big = Studio {
+            size: PictureSize {
+                width: 99_999,
+                height: 1,
+            },
+            ..studio
+        };
         assert!(too_big.proposal(&mesh).is_err());
     }
 
     #[test]
     fn threads_do_not_change_the_picture() {
         let mesh = square();
-        let studio = Studio::new(&mesh.points, PictureSize { width: 200, height: 150 });
+        let studio = Studio::new(
+            &mesh.points,
+            PictureSize {
+                width: 200,
+                height: 150,
+            },
+        );
         let shoot = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
-            pool.install(|| studio.proposal(&mesh)).expect("renders").png
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("pool");
+            pool.install(|| studio.proposal(&mesh))
+                .expect("renders")
+                .png
         };
         assert_eq!(shoot(1), shoot(2));
     }

@@ -73,21 +73,51 @@ pub(super) fn draw(scene: &Scene, camera: &Camera, width: usize, height: usize) 
     let (columns, rows) = (width * SUPER, height * SUPER);
     let view = View::new(camera, columns, rows);
     let screen = Screen {
-        triangles: scene.meshes.iter().flat_map(|mesh| view.mesh(mesh)).collect(),
+        triangles: scene
+            .meshes
+            .iter()
+            .flat_map(|mesh| view.mesh(mesh))
+            .collect(),
         discs: scene.spheres.iter().filter_map(|s| view.disc(s)).collect(),
         strokes: scene.lines.iter().filter_map(|l| view.stroke(l)).collect(),
         line_bias: (LINE_BIAS * camera.reach) as f32,
     };
-    let mut fragments =
-        vec![Fragment { colour: BACKGROUND, kind: Kind::Empty, depth: f32::NEG_INFINITY }; columns * rows];
+    let mut fragments = vec![
+        Fragment {
+            colour: BACKGROUND,
+            kind: Kind::Empty,
+            depth: f32::NEG_INFINITY
+        };
+        columns * rows
+    ];
     let bins = bin(&screen, rows);
-    fragments.par_chunks_mut(BAND * columns).zip(&bins).enumerate().for_each(|(band, (pixels, bin))| {
-        let mut target = Band { pixels, columns, first_row: band * BAND };
-        bin.triangles.iter().for_each(|&t| target.triangle(&screen.triangles[t as usize]));
-        bin.discs.iter().for_each(|&d| target.disc(&screen.discs[d as usize]));
-        bin.strokes.iter().for_each(|&s| target.stroke(&screen.strokes[s as usize], screen.line_bias));
-    });
-    finish(&fragments, width, height, camera.reach as f32, view.scale as f32)
+    fragments
+        .par_chunks_mut(BAND * columns)
+        .zip(&bins)
+        .enumerate()
+        .for_each(|(band, (pixels, bin))| {
+            let mut target = Band {
+                pixels,
+                columns,
+                first_row: band * BAND,
+            };
+            bin.triangles
+                .iter()
+                .for_each(|&t| target.triangle(&screen.triangles[t as usize]));
+            bin.discs
+                .iter()
+                .for_each(|&d| target.disc(&screen.discs[d as usize]));
+            bin.strokes
+                .iter()
+                .for_each(|&s| target.stroke(&screen.strokes[s as usize], screen.line_bias));
+        });
+    finish(
+        &fragments,
+        width,
+        height,
+        camera.reach as f32,
+        view.scale as f32,
+    )
 }
 
 /// Maps millimetres to subpixels.
@@ -102,7 +132,11 @@ impl<'a> View<'a> {
         let across = FILL[0] * columns as f64 / (2.0 * camera.half[0]);
         let down = FILL[1] * rows as f64 / (2.0 * camera.half[1]);
         let middle = [MIDDLE * columns as f64, 0.5 * rows as f64];
-        Self { camera, scale: across.min(down), middle }
+        Self {
+            camera,
+            scale: across.min(down),
+            middle,
+        }
     }
 
     fn point(&self, p: &Vec3) -> [f32; 3] {
@@ -113,14 +147,24 @@ impl<'a> View<'a> {
     }
 
     fn direction(&self, n: &Vec3) -> [f32; 3] {
-        [self.camera.right.dot(n) as f32, self.camera.up.dot(n) as f32, self.camera.toward.dot(n) as f32]
+        [
+            self.camera.right.dot(n) as f32,
+            self.camera.up.dot(n) as f32,
+            self.camera.toward.dot(n) as f32,
+        ]
     }
 
     fn mesh(&self, mesh: &SceneMesh) -> Vec<[Corner; 3]> {
         let sound = |t: &[u32; 3]| {
-            t.iter().all(|&v| mesh.points.get(v as usize).is_some_and(|p| p.iter().all(|x| x.is_finite())))
+            t.iter().all(|&v| {
+                mesh.points
+                    .get(v as usize)
+                    .is_some_and(|p| p.iter().all(|x| x.is_finite()))
+            })
         };
-        let kept: Vec<usize> = (0..mesh.triangles.len()).filter(|&t| sound(&mesh.triangles[t])).collect();
+        let kept: Vec<usize> = (0..mesh.triangles.len())
+            .filter(|&t| sound(&mesh.triangles[t]))
+            .collect();
         let triangles: Vec<[u32; 3]> = kept.iter().map(|&t| mesh.triangles[t]).collect();
         let normals = super::scene::corner_normals(&mesh.points, &triangles, mesh.shading);
         let colour = |t: usize, v: u32| {
@@ -149,11 +193,20 @@ impl<'a> View<'a> {
     fn disc(&self, sphere: &SceneSphere) -> Option<Disc> {
         let sound = sphere.centre.iter().all(|x| x.is_finite()) && sphere.radius.is_finite();
         let radius = [(sphere.radius * self.scale) as f32, sphere.radius as f32];
-        sound.then(|| Disc { at: self.point(&sphere.centre), radius, colour: sphere.colour })
+        sound.then(|| Disc {
+            at: self.point(&sphere.centre),
+            radius,
+            colour: sphere.colour,
+        })
     }
 
     fn stroke(&self, line: &SceneLine) -> Option<Stroke> {
-        let sound = line.from.iter().chain(line.to.iter()).all(|x| x.is_finite()) && line.width.is_finite();
+        let sound = line
+            .from
+            .iter()
+            .chain(line.to.iter())
+            .all(|x| x.is_finite())
+            && line.width.is_finite();
         let half_width = (line.width * SUPER as f64 / 2.0).clamp(0.5, 64.0) as f32;
         sound.then(|| Stroke {
             from: self.point(&line.from),
@@ -178,20 +231,31 @@ fn bin(screen: &Screen, rows: usize) -> Vec<Bin> {
     let span = |low: f32, high: f32| {
         let band = |y: f32| ((y / BAND as f32).floor().max(0.0) as usize).min(last);
         let visible = high >= 0.0 && low <= rows as f32;
-        if visible { band(low)..band(high) + 1 } else { 0..0 }
+        if visible {
+            band(low)..band(high) + 1
+        } else {
+            0..0
+        }
     };
     for (n, t) in screen.triangles.iter().enumerate() {
         let ys = t.each_ref().map(|c| c.at[1]);
         let range = span(ys[0].min(ys[1]).min(ys[2]), ys[0].max(ys[1]).max(ys[2]));
-        bins[range].iter_mut().for_each(|b| b.triangles.push(n as u32));
+        bins[range]
+            .iter_mut()
+            .for_each(|b| b.triangles.push(n as u32));
     }
     for (n, d) in screen.discs.iter().enumerate() {
         let range = span(d.at[1] - d.radius[0], d.at[1] + d.radius[0]);
         bins[range].iter_mut().for_each(|b| b.discs.push(n as u32));
     }
     for (n, s) in screen.strokes.iter().enumerate() {
-        let range = span(s.from[1].min(s.to[1]) - s.half_width, s.from[1].max(s.to[1]) + s.half_width);
-        bins[range].iter_mut().for_each(|b| b.strokes.push(n as u32));
+        let range = span(
+            s.from[1].min(s.to[1]) - s.half_width,
+            s.from[1].max(s.to[1]) + s.half_width,
+        );
+        bins[range]
+            .iter_mut()
+            .for_each(|b| b.strokes.push(n as u32));
     }
     bins
 }
@@ -205,7 +269,11 @@ struct Band<'a> {
 
 impl Band<'_> {
     /// Subpixel columns and rows of this band whose centres lie in the box; rows count from the top of the picture.
-    fn clip(&self, low: [f32; 2], high: [f32; 2]) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
+    fn clip(
+        &self,
+        low: [f32; 2],
+        high: [f32; 2],
+    ) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
         let rows = self.pixels.len() / self.columns;
         let from = |x: f32| (x - 0.5).ceil().max(0.0) as usize;
         let to = |x: f32| ((x - 0.5).floor() + 1.0).max(0.0) as usize;
@@ -244,7 +312,11 @@ impl Band<'_> {
                         std::array::from_fn(|k| (0..3).map(|n| w[n] * f(&t[n])[k]).sum())
                     };
                     let colour = shade(mix(|corner| &corner.colour), mix(|corner| &corner.normal));
-                    *fragment = Fragment { colour, kind: Kind::Surface, depth };
+                    *fragment = Fragment {
+                        colour,
+                        kind: Kind::Surface,
+                        depth,
+                    };
                 }
             }
         }
@@ -256,7 +328,10 @@ impl Band<'_> {
         let (columns, rows) = self.clip([cx - pixels, cy - pixels], [cx + pixels, cy + pixels]);
         for y in rows {
             for x in columns.clone() {
-                let (dx, dy) = ((x as f32 + 0.5 - cx) / pixels, (cy - y as f32 - 0.5) / pixels);
+                let (dx, dy) = (
+                    (x as f32 + 0.5 - cx) / pixels,
+                    (cy - y as f32 - 0.5) / pixels,
+                );
                 let square = dx * dx + dy * dy;
                 if square > 1.0 {
                     continue;
@@ -266,7 +341,11 @@ impl Band<'_> {
                 let fragment = self.at(x, y);
                 if depth > fragment.depth {
                     let colour = shade(d.colour.map(f32::from), [dx, dy, dz]);
-                    *fragment = Fragment { colour, kind: Kind::Surface, depth };
+                    *fragment = Fragment {
+                        colour,
+                        kind: Kind::Surface,
+                        depth,
+                    };
                 }
             }
         }
@@ -288,7 +367,11 @@ impl Band<'_> {
                 let fragment = self.at(x, y);
                 if ex * ex + ey * ey <= r * r && depth + bias > fragment.depth {
                     let depth = depth.max(fragment.depth);
-                    *fragment = Fragment { colour: s.colour, kind: Kind::Line, depth };
+                    *fragment = Fragment {
+                        colour: s.colour,
+                        kind: Kind::Line,
+                        depth,
+                    };
                 }
             }
         }
@@ -301,7 +384,12 @@ fn shade(colour: [f32; 3], normal: [f32; 3]) -> Rgb {
     const FILL_LIGHT: [f32; 3] = [0.84, -0.10, 0.53];
     let length = normal.iter().map(|n| n * n).sum::<f32>().sqrt().max(1e-12);
     let sign = if normal[2] < 0.0 { -1.0 } else { 1.0 } / length;
-    let dot = |light: [f32; 3]| (0..3).map(|k| sign * normal[k] * light[k]).sum::<f32>().max(0.0);
+    let dot = |light: [f32; 3]| {
+        (0..3)
+            .map(|k| sign * normal[k] * light[k])
+            .sum::<f32>()
+            .max(0.0)
+    };
     let light = 0.40 + 0.56 * dot(KEY) + 0.20 * dot(FILL_LIGHT);
     colour.map(|c| (c * light).clamp(0.0, 255.0) as u8)
 }
@@ -312,13 +400,21 @@ fn finish(fragments: &[Fragment], width: usize, height: usize, reach: f32, scale
     let rows = height * SUPER;
     let depth = |x: i64, y: i64| {
         let inside = x >= 0 && y >= 0 && x < columns as i64 && y < rows as i64;
-        if inside { fragments[y as usize * columns + x as usize].depth } else { f32::NEG_INFINITY }
+        if inside {
+            fragments[y as usize * columns + x as usize].depth
+        } else {
+            f32::NEG_INFINITY
+        }
     };
     let occlusion = occlusion(&depth, width, height, reach, scale);
     let pixel = |index: usize| {
         let (px, py) = (index % width, index / width);
-        let subpixels = (0..SUPER * SUPER).map(|sub| (px * SUPER + sub % SUPER, py * SUPER + sub / SUPER));
-        if subpixels.clone().all(|(x, y)| fragments[y * columns + x].kind == Kind::Empty) {
+        let subpixels =
+            (0..SUPER * SUPER).map(|sub| (px * SUPER + sub % SUPER, py * SUPER + sub / SUPER));
+        if subpixels
+            .clone()
+            .all(|(x, y)| fragments[y * columns + x].kind == Kind::Empty)
+        {
             return BACKGROUND;
         }
         let open_sky = 1.0 - blurred(&occlusion, width, height, px, py);
@@ -336,7 +432,11 @@ fn finish(fragments: &[Fragment], width: usize, height: usize, reach: f32, scale
         }
         sum.map(|s| (s / (SUPER * SUPER) as f32).round() as u8)
     };
-    (0..width * height).into_par_iter().with_min_len(width).map(pixel).collect()
+    (0..width * height)
+        .into_par_iter()
+        .with_min_len(width)
+        .map(pixel)
+        .collect()
 }
 
 /// Is the surface here the near side of a jump in depth? Second differences, so that slopes do not count.
@@ -378,7 +478,11 @@ fn occlusion(
             .sum();
         (1.3 * sum / star.len() as f32).min(0.5)
     };
-    (0..width * height).into_par_iter().with_min_len(width).map(pixel).collect()
+    (0..width * height)
+        .into_par_iter()
+        .with_min_len(width)
+        .map(pixel)
+        .collect()
 }
 
 /// Sixteen turned stars of sample offsets (subpixels) with their radius in mm, one for each pixel of a 4 x 4 pattern
@@ -389,9 +493,14 @@ fn sample_stars(reach: f32, scale: f32) -> Vec<Vec<(i64, i64, f32)>> {
     let star = |turn: usize| {
         let offsets = RINGS.iter().flat_map(|ring| {
             (0..DIRECTIONS).map(move |n| {
-                let angle = std::f32::consts::PI * (n as f32 + turn as f32 / 16.0) / DIRECTIONS as f32;
+                let angle =
+                    std::f32::consts::PI * (n as f32 + turn as f32 / 16.0) / DIRECTIONS as f32;
                 let (radius, pixels) = (ring * reach, ring * reach * scale);
-                ((angle.cos() * pixels).round() as i64, (angle.sin() * pixels).round() as i64, radius)
+                (
+                    (angle.cos() * pixels).round() as i64,
+                    (angle.sin() * pixels).round() as i64,
+                    radius,
+                )
             })
         });
         offsets.collect()
@@ -403,6 +512,8 @@ fn blurred(values: &[f32], width: usize, height: usize, px: usize, py: usize) ->
     let columns = px.saturating_sub(2)..(px + 2).min(width);
     let rows = py.saturating_sub(2)..(py + 2).min(height);
     let count = (columns.len() * rows.len()).max(1);
-    let sum: f32 = rows.flat_map(|y| columns.clone().map(move |x| values[y * width + x])).sum();
+    let sum: f32 = rows
+        .flat_map(|y| columns.clone().map(move |x| values[y * width + x]))
+        .sum();
     sum / count as f32
 }

@@ -56,7 +56,10 @@ impl SceneMesh {
 
     /// Quads in one colour, each cut into two triangles.
     pub fn quads(points: &[Vec3], quads: &[[u32; 4]], colour: Rgb) -> Self {
-        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let triangles = quads
+            .iter()
+            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect();
         Self {
             points: points.to_vec(),
             triangles,
@@ -107,7 +110,14 @@ impl Scene {
     /// Adds a line for every edge of `edges` (indices into `points`; edges with missing points are left out).
     pub fn add_edges(&mut self, points: &[Vec3], edges: &[[u32; 2]], colour: Rgb, width: f64) {
         let at = |v: u32| points.get(v as usize).copied();
-        let lines = edges.iter().filter_map(|&[a, b]| Some(SceneLine { from: at(a)?, to: at(b)?, colour, width }));
+        let lines = edges.iter().filter_map(|&[a, b]| {
+            Some(SceneLine {
+                from: at(a)?,
+                to: at(b)?,
+                colour,
+                width,
+            })
+        });
         self.lines.extend(lines);
     }
 }
@@ -116,8 +126,15 @@ impl Scene {
 ///
 /// Points at the same place count as one, so that tessellations that repeat points along face borders look smooth.
 /// Indices must be valid and points finite.
-pub(super) fn corner_normals(points: &[Vec3], triangles: &[[u32; 3]], shading: Shading) -> Vec<[Vec3; 3]> {
-    let normals: Vec<Vec3> = triangles.par_iter().map(|t| area_vector(points, t)).collect();
+pub(super) fn corner_normals(
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    shading: Shading,
+) -> Vec<[Vec3; 3]> {
+    let normals: Vec<Vec3> = triangles
+        .par_iter()
+        .map(|t| area_vector(points, t))
+        .collect();
     let Shading::Smooth(degrees) = shading else {
         return normals.into_iter().map(|n| [n; 3]).collect();
     };
@@ -141,14 +158,21 @@ pub(super) fn corner_normals(points: &[Vec3], triangles: &[[u32; 3]], shading: S
                 let mine = normals[t];
                 let mut sum = Vec3::zeros();
                 // Very many triangles in one point (a fan of a flat cap) do not need all their votes.
-                for &other in around[first[p] as usize..first[p + 1] as usize].iter().take(64) {
+                for &other in around[first[p] as usize..first[p + 1] as usize]
+                    .iter()
+                    .take(64)
+                {
                     let other = normals[other as usize];
                     let product = mine.dot(&other);
                     if product.abs() >= limit * mine.norm() * other.norm() {
                         sum += other * product.signum();
                     }
                 }
-                if sum.norm_squared() > 0.0 { sum.normalize() } else { mine }
+                if sum.norm_squared() > 0.0 {
+                    sum.normalize()
+                } else {
+                    mine
+                }
             })
         })
         .collect()
@@ -163,5 +187,7 @@ fn area_vector(points: &[Vec3], t: &[u32; 3]) -> Vec3 {
 fn same_places(points: &[Vec3]) -> Vec<u32> {
     let mut seen = HashMap::with_capacity(points.len());
     let key = |p: &Vec3| [p.x, p.y, p.z].map(|x| (x + 0.0).to_bits());
-    (0..points.len() as u32).map(|n| *seen.entry(key(&points[n as usize])).or_insert(n)).collect()
+    (0..points.len() as u32)
+        .map(|n| *seen.entry(key(&points[n as usize])).or_insert(n))
+        .collect()
 }
