@@ -473,10 +473,10 @@ impl Progress<'_> {
                 warnings.len()
             ));
         }
-        if let Some(common) = common {
-            if common.counts().map_err(|e| e.0)?.solids > 0 {
-                self.common += common.volume(VOLUME_EPS).map_err(|e| e.0)?;
-            }
+        if let Some(common) = common
+            && common.counts().map_err(|e| e.0)?.solids > 0
+        {
+            self.common += common.volume(VOLUME_EPS).map_err(|e| e.0)?;
         }
         let from = |origin: &Origin| match origin {
             Origin::Object(face) => self.kinds.get(*face as usize).copied().unwrap_or(kind),
@@ -535,8 +535,8 @@ fn unite(
     }
     let expected = body.volume + bosses - commons[0] - commons[1];
     let shape = single(at.shape).map_err(text)?;
-    gates(&shape, body.solids, expected, context)?;
-    volumes(&shape, commons, context)?;
+    let volume = gates(&shape, body.solids, expected, context)?;
+    volumes(volume, commons, context)?;
     let mesh_shape = shape.translated([0.0; 3]).map_err(text)?;
     regions(&mesh_shape, context)?;
     Ok(United {
@@ -552,7 +552,7 @@ fn gates(
     organic_solids: u32,
     expected: f64,
     context: &inspect::Context,
-) -> Result<(), String> {
+) -> Result<f64, String> {
     let text = |e: OcctError| e.0;
     if let Some(fault) = shape.faults().map_err(text)? {
         return Err(format!("the union is not valid: {fault}"));
@@ -588,14 +588,13 @@ fn gates(
             "inclusion-exclusion gives {expected:.6} mm3, the union has {volume:.6} mm3"
         ));
     }
-    Ok(())
+    Ok(volume)
 }
 
 /// Volume, common part and removed part against the ray integrals.
-fn volumes(shape: &Shape, commons: [f64; 2], context: &inspect::Context) -> Result<(), String> {
+fn volumes(volume: f64, commons: [f64; 2], context: &inspect::Context) -> Result<(), String> {
     let sum = |f: fn(&Probe) -> f64| context.probes.iter().map(f).sum::<f64>();
     let allowed = context.options.volume_tolerance * sum(|p| p.region);
-    let volume = shape.volume(VOLUME_EPS).map_err(|e| e.0)?;
     let rows = [
         ("the union", volume, context.reference),
         (
@@ -629,4 +628,72 @@ fn regions(shape: &Shape, context: &inspect::Context) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cad::{NonDesignOptions, from_mesh};
+    use crate::mesh::TriMesh;
+
+    /// A square tube about z as a mesh: outside 10 x 10 x 8 mm, inside 6 x 6.
+    fn tube() -> TriMesh {
+        let mut mesh = TriMesh::default();
+        for corner in [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]] {
+            for (half, z) in [(5.0, 0.0), (5.0, 8.0), (3.0, 8.0), (3.0, 0.0)] {
+                mesh.points
+                    .push(Vec3::new(corner[0] * half, corner[1] * half, z));
+            }
+        }
+        for k in 0..4u32 {
+            for j in 0..4 {
+                let next = (k + 1) % 4;
+                let (a, b, c, d) = (
+                    4 * k + j,
+                    4 * next + j,
+                    4 * next + (j + 1) % 4,
+                    4 * k + (j + 1) % 4,
+                );
+                mesh.triangles.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+        mesh
+    }
+
+    /// A solid that BRepCheck likes but from which a piece is missing, as silently wrong booleans make it.
+    #[test]
+    fn missing_piece_of_a_valid_solid_is_caught() -> Result<(), Box<dyn std::error::Error>> {
+        let monitor = Monitor::default();
+        let bodies = from_mesh(
+            "tube",
+            "test",
+            &tube(),
+            &NonDesignOptions::default(),
+            &monitor,
+        )?;
+        let options = CadOptions::default();
+        let probes = reference::probes(&Brep::default(), &bodies, &[None], options.rays, &monitor)?;
+        assert!(
+            (probes[0].part_volume - 512.0).abs() < 0.5,
+            "{}",
+            probes[0].part_volume
+        );
+        let context = inspect::Context {
+            bodies: &bodies,
+            options: &options,
+            probes: &probes,
+            reference: probes[0].part_volume,
+        };
+        let right = bodies[0].solid.share()?;
+        assert_eq!(volumes(512.0, [0.0; 2], &context), Ok(()));
+        assert_eq!(regions(&right, &context), Ok(()));
+        let piece = Shape::cuboid([3.5, -2.0, 1.0], [9.0, 1.0, 3.0])?;
+        let wrong = right
+            .boolean(Operation::Cut, &piece, 1e-5, false, &|| false)?
+            .shape;
+        assert!(gates(&wrong, 1, 512.0 - 9.0, &context).is_ok());
+        assert!(volumes(503.0, [0.0; 2], &context).is_err());
+        assert!(regions(&wrong, &context).is_err_and(|e| e.contains("tube")));
+        Ok(())
+    }
 }

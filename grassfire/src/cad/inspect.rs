@@ -154,10 +154,11 @@ pub(crate) fn report(
     for edge in shape.edges()? {
         shortest = shortest.min(edge.length);
         let organic = |f: u32| sources.get(f as usize) == Some(&FaceSource::Organic);
-        if let (Some([a, b]), Some(angle)) = (edge.faces, edge.angle) {
-            if organic(a) && organic(b) {
-                g1_max = g1_max.max(angle.to_degrees());
-            }
+        if let (Some([a, b]), Some(angle)) = (edge.faces, edge.angle)
+            && organic(a)
+            && organic(b)
+        {
+            g1_max = g1_max.max(angle.to_degrees());
         }
     }
     monitor.check()?;
