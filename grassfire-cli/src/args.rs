@@ -57,9 +57,6 @@ pub struct ReconstructArgs {
     /// Mesh (STL, OBJ, PLY, OFF, 3MF) or density (VTI, VTU, NPY)
     #[arg(value_name = "PART")]
     pub part: PathBuf,
-    /// Design space, to check that the solid stays inside (STEP or STL)
-    #[arg(long, value_name = "FILE")]
-    pub design_space: Option<PathBuf>,
     /// Body that must be in the solid as given (STEP or STL); may be repeated
     #[arg(long, value_name = "FILE")]
     pub non_design: Vec<PathBuf>,

@@ -20,11 +20,7 @@ pub struct Failure {
 impl Failure {
     /// Bad input or usage.
     pub fn usage(message: impl Into<String>, hint: Option<String>) -> Self {
-        Self {
-            message: message.into(),
-            hint,
-            code: 2,
-        }
+        Self { message: message.into(), hint, code: 2 }
     }
 
     /// Prints both lines on stderr.
@@ -38,11 +34,7 @@ impl Failure {
 
 impl From<PipelineError> for Failure {
     fn from(error: PipelineError) -> Self {
-        Self {
-            message: chain(&error),
-            hint: error.hint(),
-            code: error.exit_code(),
-        }
+        Self { message: chain(&error), hint: error.hint(), code: error.exit_code() }
     }
 }
 
@@ -75,10 +67,7 @@ pub fn from_clap(error: &clap::Error) -> Failure {
     let text = error.render().to_string();
     let body = text.strip_prefix("error: ").unwrap_or(&text);
     let message = body.split("\n\n").next().unwrap_or(body);
-    let line = |start: &str| {
-        text.lines()
-            .find_map(|line| line.trim().strip_prefix(start).map(str::to_owned))
-    };
+    let line = |start: &str| text.lines().find_map(|line| line.trim().strip_prefix(start).map(str::to_owned));
     let hint = line("tip: ")
         .or_else(|| line("Usage: ").map(|usage| format!("usage: {usage}")))
         .unwrap_or_else(|| "`grassfire --help` shows the usage".to_owned());
@@ -98,18 +87,6 @@ mod tests {
         assert_eq!(failure.message, "read: part.step is a STEP file; the proposal must be a mesh or a density");
         assert_eq!(failure.code, 2);
         assert!(failure.hint.is_some());
-        let io = std::io::Error::other("disk full");
-        let error = PipelineError::Solver {
-            stage: "cad",
-            source: Box::new(io),
-            hint: Some("free some".to_owned()),
-        };
-        let failure = Failure::from(error);
-        assert_eq!(failure.message, "cad: disk full");
-        assert_eq!(
-            (failure.code, failure.hint.as_deref()),
-            (3, Some("free some"))
-        );
         assert_eq!(one_line("a\n  b"), "a b");
     }
 }

@@ -150,7 +150,7 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
     let surface = record.stage("spline", || shape::surface(mesh, voxel, options, monitor))?;
     record.stage("write", || delivery.stl("body.stl", &surface.tessellation.mesh))?;
     let intersections = shape.fitted.self_intersections.len();
-    let part = record.stage("cad", || union::part(&surface, mesh, &bodies, intersections, voxel, options, monitor))?;
+    let part = record.stage("cad", || union::part(&surface, &bodies, intersections, voxel, options, monitor))?;
     record.report.solid = part.block.clone();
     record.report.non_design = part.non_design.clone();
     record.stage("write", || union::deliver(&part, &product_name(&job.part), &delivery))?;
@@ -170,22 +170,4 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
 /// Name of the product in the STEP file: the proposal's file name.
 fn product_name(part: &Path) -> String {
     part.file_stem().map_or_else(|| "part".to_owned(), |stem| stem.to_string_lossy().into_owned())
-    monitor.step("input", "reading", 0.0)?;
-    let refuse = |source| PipelineError::Input {
-        stage: "input",
-        source,
-        hint: None,
-    };
-    let bytes = std::fs::read(&job.part)
-        .map_err(|e| refuse(format!("{}: {e}", job.part.display()).into()))?;
-    if bytes.is_empty() {
-        return Err(refuse(
-            format!("{}: the file is empty", job.part.display()).into(),
-        ));
-    }
-    Err(PipelineError::Solver {
-        stage: "remesh",
-        source: "the stages are not joined yet".into(),
-        hint: None,
-    })
 }

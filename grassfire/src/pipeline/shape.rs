@@ -13,7 +13,7 @@ use crate::radii;
 use crate::remesh::Remeshed;
 use crate::skeleton::{self, QuadSkeleton, Skeleton, quad_skeleton};
 use crate::spline::{
-    self, Brep, BrepOptions, ControlMesh, FaceMode, G1Report, Patch, SplineError, Tessellation, build_brep, patches, tessellate,
+    self, Brep, ControlMesh, G1Report, SplineError, Tessellation, build_brep, patches, tessellate,
 };
 use crate::thicken::{ThickenedBody, thicken};
 
@@ -41,7 +41,6 @@ pub(super) struct Shape {
 
 /// The smooth surface of the body.
 pub(super) struct Surface {
-    pub(super) patches: Vec<Patch>,
     pub(super) g1: G1Report,
     pub(super) brep: Brep,
     pub(super) tessellation: Tessellation,
@@ -131,11 +130,5 @@ pub(super) fn surface(
     let mut fine = options.tessellate;
     fine.chord = fine.chord.min(0.1 * voxel);
     let tessellation = tessellate(mesh, &patches, &fine)?;
-    Ok(Surface { patches, g1, brep, tessellation })
-}
-
-/// The same body with one face a quad, for booleans that fail on merged faces.
-#[cfg(feature = "occt")]
-pub(super) fn quads_brep(mesh: &ControlMesh, surface: &Surface, monitor: &Monitor) -> Result<Brep, SplineError> {
-    build_brep(mesh, &surface.patches, &BrepOptions { faces: FaceMode::Quads }, monitor)
+    Ok(Surface { g1, brep, tessellation })
 }

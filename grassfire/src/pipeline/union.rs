@@ -9,7 +9,6 @@ use crate::cad::{self, CadSolid, NonDesignResult, StepOptions};
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
 use crate::report::{NonDesignBlock, SolidBlock};
-use crate::spline::ControlMesh;
 
 /// The finished part.
 pub(super) struct Part {
@@ -35,15 +34,13 @@ const CHORD: f64 = 0.05;
 #[cfg(feature = "occt")]
 pub(super) fn part(
     surface: &Surface,
-    mesh: &ControlMesh,
     bodies: &Bodies,
     intersections: usize,
     voxel: f64,
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Part, StageError> {
-    let quads = || super::shape::quads_brep(mesh, surface, monitor).map_err(|e| e.to_string());
-    let mut solid = cad::build(&surface.brep, &bodies.solids, &options.cad, Some(&quads), monitor)?;
+    let mut solid = cad::build(&surface.brep, &bodies.solids, &options.cad, monitor)?;
     for message in &solid.messages {
         monitor.warn("cad", message.clone());
     }
@@ -93,7 +90,6 @@ pub(super) fn deliver(part: &Part, product: &str, delivery: &Delivery) -> Result
 #[cfg(not(feature = "occt"))]
 pub(super) fn part(
     surface: &Surface,
-    _mesh: &ControlMesh,
     _bodies: &Bodies,
     _intersections: usize,
     _voxel: f64,
