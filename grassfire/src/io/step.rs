@@ -75,7 +75,7 @@ fn scan(src: &Source) -> Result<Scan, IoError> {
         match b {
             b'\n' => {
                 scan.lines += 1;
-                if scan.lines % 100_000 == 0 {
+                if scan.lines.is_multiple_of(100_000) {
                     src.monitor.check()?;
                 }
                 at += 1;

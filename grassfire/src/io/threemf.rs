@@ -248,7 +248,7 @@ fn read_model(
     loop {
         buffer.clear();
         events += 1;
-        if events % 100_000 == 0 {
+        if events.is_multiple_of(100_000) {
             src.monitor.check()?;
         }
         let at = reader.buffer_position();

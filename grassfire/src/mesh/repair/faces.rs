@@ -69,7 +69,7 @@ fn drop_opposite(mesh: &mut TriMesh) -> usize {
     let mut keep = vec![true; mesh.triangles.len()];
     for pair in keyed.windows(2).filter(|p| p[0].0 == p[1].0) {
         let (a, b) = (pair[0].2 as usize, pair[1].2 as usize);
-        let even = (0..3).all(|k| edges.around(a, k).len() % 2 == 0);
+        let even = (0..3).all(|k| edges.around(a, k).len().is_multiple_of(2));
         keep[a.max(b)] = false;
         keep[a.min(b)] = !even;
     }

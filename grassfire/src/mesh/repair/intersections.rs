@@ -77,15 +77,16 @@ impl Cells {
 
     /// Cells that the box of face `t` reaches into; `None` when they are too many.
     fn range(&self, t: usize) -> Option<impl Iterator<Item = [u32; 3]> + use<>> {
-        let [lo, hi] = self.boxes[t].map(|p| ((p - self.lower) / self.size).map(|x| x as u32));
+        let [lo, hi] = self.boxes[t].map(|p| self.cell(&p));
         if (0..3).any(|a| (hi[a] - lo[a]) as usize >= MAX_SPAN) {
             return None;
         }
-        let plane = move |k| (lo.y..=hi.y).flat_map(move |j| (lo.x..=hi.x).map(move |i| [i, j, k]));
-        Some((lo.z..=hi.z).flat_map(plane))
+        let plane =
+            move |k| (lo[1]..=hi[1]).flat_map(move |j| (lo[0]..=hi[0]).map(move |i| [i, j, k]));
+        Some((lo[2]..=hi[2]).flat_map(plane))
     }
 
-    /// Faces in the same cells as `t`; all faces for a large one. Some come more than once.
+    /// Faces in the same cells as `t`, each once; all faces for a large one.
     fn near(&self, t: usize) -> impl Iterator<Item = u32> + '_ {
         let range = self.range(t);
         let all = if range.is_none() {
@@ -93,12 +94,16 @@ impl Cells {
         } else {
             0..0
         };
-        let in_cell = |cell: [u32; 3]| {
+        let in_cell = move |cell: [u32; 3]| {
             let start = self.entries.partition_point(|e| e.0 < cell);
-            self.entries[start..]
+            let faces = self.entries[start..]
                 .iter()
                 .take_while(move |e| e.0 == cell)
-                .map(|e| e.1)
+                .map(|e| e.1);
+            // Two boxes share many cells; the one where their common part begins speaks for all.
+            faces.filter(move |&o| {
+                self.cell(&self.boxes[t][0].sup(&self.boxes[o as usize][0])) == cell
+            })
         };
         range
             .into_iter()
@@ -106,6 +111,10 @@ impl Cells {
             .flat_map(in_cell)
             .chain(self.large.iter().copied())
             .chain(all)
+    }
+
+    fn cell(&self, p: &Vec3) -> [u32; 3] {
+        ((p - self.lower) / self.size).map(|x| x as u32).into()
     }
 
     fn touch(&self, t: usize, other: usize) -> bool {

@@ -96,7 +96,7 @@ impl<'a> Rays<'a> {
     /// Sorted shells that a ray from `p` leaves more often than it enters, or the other way: those that contain `p`.
     pub fn containing(&self, p: &Vec3) -> Vec<u32> {
         let q = project(p);
-        if (0..2).any(|a| !(q[a] >= self.lower[a])) {
+        if (0..2).any(|a| q[a].is_nan() || q[a] < self.lower[a]) {
             return Vec::new();
         }
         let Some(cell) = self.cells(&[q, q]).next() else {
