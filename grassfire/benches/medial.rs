@@ -128,7 +128,7 @@ fn gyroid_part(n: usize) -> VoxelGrid<f32> {
                 (random(0) - 0.5) * 50.0,
                 (random(1) - 0.5) * 50.0,
                 (random(2) - 0.5) * 50.0,
-                random(3) * 6.28,
+                random(3) * 2.0 * PI,
             ]
         })
         .collect();
