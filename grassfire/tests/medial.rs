@@ -19,13 +19,18 @@ fn grid(n: [usize; 3], f: impl Fn(Vec3) -> f64) -> VoxelGrid<f32> {
 }
 
 fn axis(field: &VoxelGrid<f32>) -> MedialAxis {
-    let axis = medial_axis(field, &MedialOptions::default(), &Monitor::default()).expect("a solid has a medial axis");
+    let axis = medial_axis(field, &MedialOptions::default(), &Monitor::default())
+        .expect("a solid has a medial axis");
     let mesh = &axis.mesh;
     assert_eq!(mesh.points.len(), mesh.radii.len());
     assert!(mesh.points.iter().all(|p| p.iter().all(|x| x.is_finite())));
     assert!(mesh.radii.iter().all(|r| r.is_finite() && *r > 0.0));
     let mut used = vec![false; mesh.points.len()];
-    mesh.triangles.iter().flatten().chain(mesh.edges.iter().flatten()).for_each(|&v| used[v as usize] = true);
+    mesh.triangles
+        .iter()
+        .flatten()
+        .chain(mesh.edges.iter().flatten())
+        .for_each(|&v| used[v as usize] = true);
     assert!(used.iter().all(|u| *u), "a point belongs to nothing");
     axis
 }
@@ -45,20 +50,36 @@ fn block(p: Vec3, centre: [f64; 3], half: [f64; 3]) -> f64 {
 fn ball_becomes_one_short_edge() {
     let result = axis(&grid([24; 3], |p| 9.0 - (p - Vec3::repeat(11.3)).norm()));
     assert_eq!(result.pruned, Betti::from_chi(1, 0, 1));
-    assert_eq!((result.mesh.triangles.len(), result.mesh.edges.len()), (0, 1));
+    assert_eq!(
+        (result.mesh.triangles.len(), result.mesh.edges.len()),
+        (0, 1)
+    );
     let centre = Vec3::new(-3.0, 10.0, 200.0) + Vec3::repeat(0.5 * 11.3);
     for (p, r) in result.mesh.points.iter().zip(&result.mesh.radii) {
-        assert!((p - centre).norm() < 0.5 && (r - 4.5).abs() < 0.3, "{p} {r}");
+        assert!(
+            (p - centre).norm() < 0.5 && (r - 4.5).abs() < 0.3,
+            "{p} {r}"
+        );
     }
     assert!((result.mesh.points[0] - result.mesh.points[1]).norm() > 0.2);
 }
 
 #[test]
 fn rod_becomes_a_curve_of_its_length() {
-    let result = axis(&grid([60, 16, 16], |p| capsule(p, [8.0, 7.4, 7.7], [51.0, 7.9, 7.4], 4.4)));
+    let result = axis(&grid([60, 16, 16], |p| {
+        capsule(p, [8.0, 7.4, 7.7], [51.0, 7.9, 7.4], 4.4)
+    }));
     assert_eq!(result.pruned, Betti::from_chi(1, 0, 1));
     assert!(result.mesh.triangles.is_empty());
-    let x = |wanted: fn(f64, f64) -> f64| result.mesh.points.iter().map(|p| p.x).reduce(wanted).unwrap_or_default();
+    let x = |wanted: fn(f64, f64) -> f64| {
+        result
+            .mesh
+            .points
+            .iter()
+            .map(|p| p.x)
+            .reduce(wanted)
+            .unwrap_or_default()
+    };
     let length = x(f64::max) - x(f64::min);
     assert!((length - 21.5).abs() < 2.5, "length {length}");
 }
@@ -75,28 +96,60 @@ fn torus_becomes_a_loop() {
 
 #[test]
 fn plate_keeps_its_extent_and_thickness() {
-    let result = axis(&grid([50, 40, 14], |p| block(p, [24.5, 19.5, 6.5], [20.0, 15.0, 3.0])));
+    let result = axis(&grid([50, 40, 14], |p| {
+        block(p, [24.5, 19.5, 6.5], [20.0, 15.0, 3.0])
+    }));
     assert_eq!(result.pruned, Betti::from_chi(1, 0, 1));
     assert!(result.mesh.edges.is_empty() && !result.mesh.triangles.is_empty());
     let mut radii = result.mesh.radii.clone();
     radii.sort_by(f64::total_cmp);
-    assert!((radii[radii.len() / 2] - 1.5).abs() < 0.15, "median radius {}", radii[radii.len() / 2]);
-    let x = |wanted: fn(f64, f64) -> f64| result.mesh.points.iter().map(|p| p.x).reduce(wanted).unwrap_or_default();
-    assert!(x(f64::max) - x(f64::min) > 16.0, "the rims did not grow back");
+    assert!(
+        (radii[radii.len() / 2] - 1.5).abs() < 0.15,
+        "median radius {}",
+        radii[radii.len() / 2]
+    );
+    let x = |wanted: fn(f64, f64) -> f64| {
+        result
+            .mesh
+            .points
+            .iter()
+            .map(|p| p.x)
+            .reduce(wanted)
+            .unwrap_or_default()
+    };
+    assert!(
+        x(f64::max) - x(f64::min) > 16.0,
+        "the rims did not grow back"
+    );
 }
 
 #[test]
 fn branches_and_seams() {
-    let tee = |p: Vec3| block(p, [24.5, 19.5, 6.5], [20.0, 15.0, 2.5]).max(block(p, [24.5, 19.5, 14.5], [20.0, 2.5, 9.0]));
+    let tee = |p: Vec3| {
+        block(p, [24.5, 19.5, 6.5], [20.0, 15.0, 2.5]).max(block(
+            p,
+            [24.5, 19.5, 14.5],
+            [20.0, 2.5, 9.0],
+        ))
+    };
     let result = axis(&grid([50, 40, 28], tee));
     assert_eq!(result.pruned, Betti::from_chi(1, 0, 1));
     assert!(result.mesh.edges.is_empty());
     let tips = [[8.0, 8.0, 9.0], [52.0, 10.0, 9.0], [30.0, 48.0, 9.0]];
-    let wye = |p: Vec3| tips.into_iter().map(|tip| capsule(p, [30.0, 24.0, 9.0], tip, 4.3)).fold(f64::MIN, f64::max);
+    let wye = |p: Vec3| {
+        tips.into_iter()
+            .map(|tip| capsule(p, [30.0, 24.0, 9.0], tip, 4.3))
+            .fold(f64::MIN, f64::max)
+    };
     let result = axis(&grid([60, 56, 18], wye));
     assert_eq!(result.pruned, Betti::from_chi(1, 0, 1));
     let mut degree = vec![0; result.mesh.points.len()];
-    result.mesh.edges.iter().flatten().for_each(|&v| degree[v as usize] += 1);
+    result
+        .mesh
+        .edges
+        .iter()
+        .flatten()
+        .for_each(|&v| degree[v as usize] += 1);
     assert_eq!(degree.iter().filter(|d| **d == 1).count(), 3);
 }
 
@@ -107,9 +160,15 @@ fn cavities_and_components() {
     // A shell, a shell in it, a ball in that, and a rod beside them.
     let nested = |p: Vec3| {
         let d = (p - Vec3::repeat(22.3)).norm();
-        (2.5 - (d - 18.0).abs()).max(2.5 - (d - 10.0).abs()).max(4.0 - d).max(capsule(p, [50.0, 8.0, 8.0], [50.0, 8.0, 34.0], 3.5))
+        (2.5 - (d - 18.0).abs())
+            .max(2.5 - (d - 10.0).abs())
+            .max(4.0 - d)
+            .max(capsule(p, [50.0, 8.0, 8.0], [50.0, 8.0, 34.0], 3.5))
     };
-    assert_eq!(axis(&grid([56, 46, 46], nested)).pruned, Betti::from_chi(4, 2, 6));
+    assert_eq!(
+        axis(&grid([56, 46, 46], nested)).pruned,
+        Betti::from_chi(4, 2, 6)
+    );
 }
 
 fn gyroid(p: Vec3) -> f64 {
@@ -130,7 +189,9 @@ fn topology_does_not_depend_on_pose() {
     let shape = |p: Vec3| {
         let hole = (p.x - 5.0).hypot(p.y) - 5.0;
         let plate = block(p, [0.0; 3], [16.0, 11.0, 3.0]).min(hole);
-        plate.max(capsule(p, [-13.0, 0.0, 0.0], [-13.0, 0.0, 14.0], 3.4)).max(capsule(p, [13.0, 8.0, 0.0], [-13.0, 0.0, 13.0], 3.2))
+        plate
+            .max(capsule(p, [-13.0, 0.0, 0.0], [-13.0, 0.0, 14.0], 3.4))
+            .max(capsule(p, [13.0, 8.0, 0.0], [-13.0, 0.0, 13.0], 3.2))
     };
     for turn in 0..4 {
         let turns = f64::from(turn);
@@ -145,7 +206,10 @@ fn topology_does_not_depend_on_pose() {
 fn result_does_not_depend_on_threads() {
     let field = grid([40, 36, 32], gyroid);
     let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a small thread pool");
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a small thread pool");
         pool.install(|| axis(&field).mesh)
     };
     assert!(run(1) == run(2));
@@ -154,26 +218,56 @@ fn result_does_not_depend_on_threads() {
 #[test]
 fn smallest_solids() {
     for n in [[1, 1, 1], [2, 1, 1], [5, 1, 1], [3, 3, 1], [1, 1, 40]] {
-        assert_eq!(axis(&grid(n, |_| 1.0)).pruned, Betti::from_chi(1, 0, 1), "{n:?}");
+        assert_eq!(
+            axis(&grid(n, |_| 1.0)).pruned,
+            Betti::from_chi(1, 0, 1),
+            "{n:?}"
+        );
     }
 }
 
 #[test]
 fn bad_input_is_named() {
-    let run = |field: &VoxelGrid<f32>, options: &MedialOptions| medial_axis(field, options, &Monitor::default()).map(|_| ());
+    let run = |field: &VoxelGrid<f32>, options: &MedialOptions| {
+        medial_axis(field, options, &Monitor::default()).map(|_| ())
+    };
     let options = MedialOptions::default();
-    assert_eq!(run(&grid([0, 4, 4], |_| 1.0), &options), Err(MedialError::Empty));
-    assert_eq!(run(&grid([4; 3], |_| -1.0), &options), Err(MedialError::Empty));
-    assert_eq!(run(&grid([4; 3], |_| f64::NAN), &options), Err(MedialError::Empty));
+    assert_eq!(
+        run(&grid([0, 4, 4], |_| 1.0), &options),
+        Err(MedialError::Empty)
+    );
+    assert_eq!(
+        run(&grid([4; 3], |_| -1.0), &options),
+        Err(MedialError::Empty)
+    );
+    assert_eq!(
+        run(&grid([4; 3], |_| f64::NAN), &options),
+        Err(MedialError::Empty)
+    );
     let mut short = grid([4; 3], |_| 1.0);
     short.values.pop();
-    assert!(matches!(run(&short, &options), Err(MedialError::BadGrid { .. })));
-    let wrong = MedialOptions { sheet_ratio: f64::NAN, ..options };
-    assert!(matches!(run(&grid([4; 3], |_| 1.0), &wrong), Err(MedialError::BadOption { name: "sheet_ratio", .. })));
+    assert!(matches!(
+        run(&short, &options),
+        Err(MedialError::BadGrid { .. })
+    ));
+    let wrong = MedialOptions {
+        sheet_ratio: f64::NAN,
+        ..options
+    };
+    assert!(matches!(
+        run(&grid([4; 3], |_| 1.0), &wrong),
+        Err(MedialError::BadOption {
+            name: "sheet_ratio",
+            ..
+        })
+    ));
     let monitor = Monitor::default();
     monitor.cancel();
     let cancelled = medial_axis(&grid([4; 3], |_| 1.0), &MedialOptions::default(), &monitor);
-    assert!(matches!(cancelled.map(|_| ()), Err(MedialError::Cancelled(_))));
+    assert!(matches!(
+        cancelled.map(|_| ()),
+        Err(MedialError::Cancelled(_))
+    ));
 }
 
 proptest! {
@@ -226,7 +320,10 @@ fn box_surface(n: [i32; 3], h: f64) -> TriMesh {
     let mut mesh = TriMesh::default();
     for axis in 0..3 {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        for (side, a, b) in [0, n[axis]].into_iter().flat_map(|s| (0..n[u]).flat_map(move |a| (0..n[v]).map(move |b| (s, a, b)))) {
+        for (side, a, b) in [0, n[axis]]
+            .into_iter()
+            .flat_map(|s| (0..n[u]).flat_map(move |a| (0..n[v]).map(move |b| (s, a, b))))
+        {
             let mut quad = [[a, b], [a + 1, b], [a + 1, b + 1], [a, b + 1]].map(|[a, b]| {
                 let mut at = [0; 3];
                 (at[axis], at[u], at[v]) = (side, a, b);
@@ -238,7 +335,8 @@ fn box_surface(n: [i32; 3], h: f64) -> TriMesh {
             if side == 0 {
                 quad.reverse();
             }
-            mesh.triangles.extend([[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]);
+            mesh.triangles
+                .extend([[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]);
         }
     }
     mesh
@@ -247,13 +345,25 @@ fn box_surface(n: [i32; 3], h: f64) -> TriMesh {
 #[test]
 fn poles_measure_the_thickness_of_a_plate() {
     let solid = Solid::try_from(box_surface([40, 30, 6], 0.37)).expect("a closed box");
-    let result = poles(&solid, &PoleOptions::default(), &Monitor::default()).expect("a box has poles");
+    let result =
+        poles(&solid, &PoleOptions::default(), &Monitor::default()).expect("a box has poles");
     assert_eq!(result.points.len(), solid.points.len());
     assert_eq!(result.triangles, solid.triangles);
     let half = 0.37 * 3.0;
-    assert!(result.thickness.iter().all(|t| *t > 0.0 && *t < 1.02 * half * 3f64.sqrt()));
-    for (p, (pole, t)) in solid.points.iter().zip(result.points.iter().zip(&result.thickness)) {
-        let border = [p.x, p.y, 14.8 - p.x, 11.1 - p.y].into_iter().fold(f64::MAX, f64::min);
+    assert!(
+        result
+            .thickness
+            .iter()
+            .all(|t| *t > 0.0 && *t < 1.02 * half * 3f64.sqrt())
+    );
+    for (p, (pole, t)) in solid
+        .points
+        .iter()
+        .zip(result.points.iter().zip(&result.thickness))
+    {
+        let border = [p.x, p.y, 14.8 - p.x, 11.1 - p.y]
+            .into_iter()
+            .fold(f64::MAX, f64::min);
         if border > 2.0 * half {
             assert!((t - half).abs() < 0.03 * half, "{p}: {t}");
             assert!((pole.z - half).abs() < 0.03 * half);

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::burn::{Alive, FaceSpheres, burn, distance, regrow};
 use super::complex::Complex;
-use super::curves::prune_curves;
+use super::curves::{prune_curves, trim_tips};
 use super::delaunay::{NONE, delaunay_lattice};
 use super::refit::refit;
 use super::union_find::UnionFind;
@@ -42,7 +42,11 @@ const STAGE: &str = "medial";
 /// # Sources
 /// Yan, Letscher, Ju 2018, <https://doi.org/10.1145/3197517.3201396> (voxel cores); Yan, Sykes,
 /// Chambers, Letscher, Ju 2016, <https://doi.org/10.1145/2897824.2925938> (erosion thickness).
-pub fn medial_axis(field: &VoxelGrid<f32>, options: &MedialOptions, monitor: &Monitor) -> Result<MedialAxis, MedialError> {
+pub fn medial_axis(
+    field: &VoxelGrid<f32>,
+    options: &MedialOptions,
+    monitor: &Monitor,
+) -> Result<MedialAxis, MedialError> {
     options.check()?;
     check_grid(field)?;
     monitor.step(STAGE, "corners", 0.0)?;
@@ -51,7 +55,8 @@ pub fn medial_axis(field: &VoxelGrid<f32>, options: &MedialOptions, monitor: &Mo
     if samples.is_empty() {
         return Err(MedialError::Empty);
     }
-    let (solid, triangulation) = rayon::join(|| voxels.betti(chi), || delaunay_lattice(&samples, monitor));
+    let (solid, triangulation) =
+        rayon::join(|| voxels.betti(chi), || delaunay_lattice(&samples, monitor));
     let mut complex = {
         let triangulation = triangulation?;
         monitor.step(STAGE, "Voronoi complex", 0.4)?;
@@ -73,21 +78,37 @@ pub fn medial_axis(field: &VoxelGrid<f32>, options: &MedialOptions, monitor: &Mo
     let mesh = triangulate(&complex, &alive, &points, &samples, field, options);
     let pruned = betti(&mesh, complex.complement.sets() as i64 - 1);
     same(solid, pruned, "pruned complex")?;
-    Ok(MedialAxis { mesh, solid, complex: full, pruned, samples: samples.len() })
+    Ok(MedialAxis {
+        mesh,
+        solid,
+        complex: full,
+        pruned,
+        samples: samples.len(),
+    })
 }
 
 fn check_grid(field: &VoxelGrid<f32>) -> Result<(), MedialError> {
     let [nx, ny, nz] = field.dims;
     let count = nx.checked_mul(ny).and_then(|n| n.checked_mul(nz));
-    let sound = field.spacing.is_finite() && field.spacing > 0.0 && field.origin.iter().all(|x| x.is_finite());
+    let sound = field.spacing.is_finite()
+        && field.spacing > 0.0
+        && field.origin.iter().all(|x| x.is_finite());
     if count != Some(field.values.len()) || !sound {
-        return Err(MedialError::BadGrid { dims: field.dims, values: field.values.len(), spacing: field.spacing });
+        return Err(MedialError::BadGrid {
+            dims: field.dims,
+            values: field.values.len(),
+            spacing: field.spacing,
+        });
     }
     Ok(())
 }
 
 fn same(wanted: Betti, found: Betti, at: &'static str) -> Result<(), MedialError> {
-    if wanted == found { Ok(()) } else { Err(MedialError::Topology { at, wanted, found }) }
+    if wanted == found {
+        Ok(())
+    } else {
+        Err(MedialError::Topology { at, wanted, found })
+    }
 }
 
 /// Step 4: what of the complex is kept, and the edges that stand for components without extent.
@@ -102,35 +123,66 @@ fn prune(
     let limit = |f: u32| options.sheet_limit(spheres.radii[f as usize]);
     let mut alive = Alive::all(complex);
     let (full, pruning) = rayon::join(
-        || burn(complex, spheres, &mut Alive::all(complex), |_| f32::INFINITY, monitor),
+        || {
+            burn(
+                complex,
+                spheres,
+                &mut Alive::all(complex),
+                |_| f32::INFINITY,
+                monitor,
+            )
+        },
         || burn(complex, spheres, &mut alive, limit, monitor),
     );
     let (times, collapses) = (full?.0, pruning?.1);
     monitor.step(STAGE, "sheets", 0.75)?;
     let ribbon = ribbons(complex, spheres, &alive, &times, options);
     burn(complex, spheres, &mut alive, only(&ribbon), monitor)?;
-    regrow(complex, spheres, samples, &times, &mut alive, &collapses, options.regrow_sine);
+    regrow(
+        complex,
+        spheres,
+        samples,
+        &times,
+        &mut alive,
+        &collapses,
+        options.regrow_sine,
+    );
     drop((times, collapses));
     let island = islands(complex, spheres, &alive, options);
     burn(complex, spheres, &mut alive, only(&island), monitor)?;
     monitor.step(STAGE, "curves", 0.85)?;
-    let points = prune_curves(complex, &mut alive, |r| options.curve_limit(r), |r| options.tip_limit(r));
+    let points = prune_curves(complex, &mut alive, |r| options.curve_limit(r));
+    trim_tips(complex, &mut alive, |r| options.tip_limit(r));
     Ok((alive, points))
 }
 
 /// Faces of sheets that are nowhere thicker than `ribbon_ratio` times their radius.
-fn ribbons(complex: &Complex, spheres: &FaceSpheres, alive: &Alive, times: &[f32], options: &MedialOptions) -> Vec<bool> {
+fn ribbons(
+    complex: &Complex,
+    spheres: &FaceSpheres,
+    alive: &Alive,
+    times: &[f32],
+    options: &MedialOptions,
+) -> Vec<bool> {
     let sheet = alive.sheets(complex);
     let mut deepest = vec![0.0f32; complex.faces()];
     for (f, &s) in sheet.iter().enumerate().filter(|(_, s)| **s != NONE) {
         let ratio = (times[f] - spheres.radii[f]) / spheres.radii[f];
         deepest[s as usize] = deepest[s as usize].max(ratio);
     }
-    sheet.iter().map(|&s| s != NONE && f64::from(deepest[s as usize]) < options.ribbon_ratio).collect()
+    sheet
+        .iter()
+        .map(|&s| s != NONE && f64::from(deepest[s as usize]) < options.ribbon_ratio)
+        .collect()
 }
 
 /// Faces of sheets without seams that are too small to be worth a sheet: they flicker along slender members.
-fn islands(complex: &Complex, spheres: &FaceSpheres, alive: &Alive, options: &MedialOptions) -> Vec<bool> {
+fn islands(
+    complex: &Complex,
+    spheres: &FaceSpheres,
+    alive: &Alive,
+    options: &MedialOptions,
+) -> Vec<bool> {
     let sheet = alive.sheets(complex);
     let mut area = vec![0.0f64; complex.faces()];
     let mut moment = vec![0.0f64; complex.faces()];
@@ -139,10 +191,16 @@ fn islands(complex: &Complex, spheres: &FaceSpheres, alive: &Alive, options: &Me
         let a = face_area(complex, &spheres.centres[f], f as u32);
         area[s as usize] += a;
         moment[s as usize] += a * f64::from(spheres.radii[f]);
-        seam[s as usize] |= complex.edges_of(f as u32).iter().any(|&e| alive.faces_at(complex, e).count() > 2);
+        seam[s as usize] |= complex
+            .edges_of(f as u32)
+            .iter()
+            .any(|&e| alive.faces_at(complex, e).count() > 2);
     }
     let small = |s: usize| !seam[s] && area[s].powi(3) < (options.island_ratio * moment[s]).powi(2);
-    sheet.iter().map(|&s| s != NONE && small(s as usize)).collect()
+    sheet
+        .iter()
+        .map(|&s| s != NONE && small(s as usize))
+        .collect()
 }
 
 /// Area of a face as a fan about its centre, in square voxels.
@@ -158,7 +216,13 @@ fn face_area(complex: &Complex, centre: &[f32; 3], face: u32) -> f64 {
 
 /// A burn limit that lets the wanted faces burn and no others.
 fn only(wanted: &[bool]) -> impl Fn(u32) -> f32 {
-    |f| if wanted[f as usize] { f32::INFINITY } else { f32::NEG_INFINITY }
+    |f| {
+        if wanted[f as usize] {
+            f32::INFINITY
+        } else {
+            f32::NEG_INFINITY
+        }
+    }
 }
 
 /// Steps 5 and 6.
@@ -171,25 +235,46 @@ fn triangulate(
     options: &MedialOptions,
 ) -> MedialMesh {
     let mut used = vec![false; complex.radii.len()];
-    for (ends, _) in complex.edges.iter().zip(&alive.edges).filter(|(_, alive)| **alive) {
+    for (ends, _) in complex
+        .edges
+        .iter()
+        .zip(&alive.edges)
+        .filter(|(_, alive)| **alive)
+    {
         ends.iter().for_each(|&v| used[v as usize] = true);
     }
-    let wanted: Vec<u32> = (0..used.len() as u32).filter(|&v| used[v as usize]).collect();
+    let wanted: Vec<u32> = (0..used.len() as u32)
+        .filter(|&v| used[v as usize])
+        .collect();
     let mut number = vec![NONE; used.len()];
-    wanted.iter().enumerate().for_each(|(i, &v)| number[v as usize] = i as u32);
+    wanted
+        .iter()
+        .enumerate()
+        .for_each(|(i, &v)| number[v as usize] = i as u32);
     let mut mesh = MedialMesh::default();
-    (mesh.points, mesh.radii) = refit(complex, &wanted, samples, field, options).into_iter().unzip();
+    (mesh.points, mesh.radii) = refit(complex, &wanted, samples, field, options)
+        .into_iter()
+        .unzip();
     for f in (0..complex.faces() as u32).filter(|&f| alive.faces[f as usize]) {
-        let polygon: Vec<u32> = complex.polygon(f).iter().map(|&v| number[v as usize]).collect();
+        let polygon: Vec<u32> = complex
+            .polygon(f)
+            .iter()
+            .map(|&v| number[v as usize])
+            .collect();
         add_polygon(&mut mesh, &polygon);
     }
     for e in (0..complex.edges.len() as u32).filter(|&e| alive.edges[e as usize]) {
         if alive.faces_at(complex, e).next().is_none() {
-            mesh.edges.push(complex.edges[e as usize].map(|v| number[v as usize]));
+            mesh.edges
+                .push(complex.edges[e as usize].map(|v| number[v as usize]));
         }
     }
     for &e in points {
-        spread(&mut mesh, complex.edges[e as usize].map(|v| number[v as usize] as usize), 0.5 * field.spacing);
+        spread(
+            &mut mesh,
+            complex.edges[e as usize].map(|v| number[v as usize] as usize),
+            0.5 * field.spacing,
+        );
     }
     mesh
 }
@@ -201,13 +286,17 @@ fn add_polygon(mesh: &mut MedialMesh, polygon: &[u32]) {
         return;
     }
     let share = 1.0 / polygon.len() as f64;
-    let centre = polygon.iter().fold(Vec3::zeros(), |sum, &v| sum + mesh.points[v as usize]) * share;
+    let centre = polygon
+        .iter()
+        .fold(Vec3::zeros(), |sum, &v| sum + mesh.points[v as usize])
+        * share;
     let radius = polygon.iter().map(|&v| mesh.radii[v as usize]).sum::<f64>() * share;
     let hub = mesh.points.len() as u32;
     mesh.points.push(centre);
     mesh.radii.push(radius);
     for (i, &v) in polygon.iter().enumerate() {
-        mesh.triangles.push([v, polygon[(i + 1) % polygon.len()], hub]);
+        mesh.triangles
+            .push([v, polygon[(i + 1) % polygon.len()], hub]);
     }
 }
 
@@ -235,7 +324,9 @@ fn betti(mesh: &MedialMesh, cavities: i64) -> Betti {
     edges.par_sort_unstable();
     edges.dedup();
     let mut sets = UnionFind::new(mesh.points.len());
-    edges.iter().for_each(|&e| sets.unite((e >> 32) as u32, e as u32));
+    edges
+        .iter()
+        .for_each(|&e| sets.unite((e >> 32) as u32, e as u32));
     let chi = mesh.points.len() as i64 - edges.len() as i64 + mesh.triangles.len() as i64;
     Betti::from_chi(sets.sets() as i64, cavities, chi)
 }

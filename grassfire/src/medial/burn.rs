@@ -24,13 +24,22 @@ pub(super) struct Collapse {
 
 impl Alive {
     pub(super) fn all(complex: &Complex) -> Self {
-        Self { faces: vec![true; complex.faces()], edges: vec![true; complex.edges.len()] }
+        Self {
+            faces: vec![true; complex.faces()],
+            edges: vec![true; complex.edges.len()],
+        }
     }
 
     /// Alive faces at edge `e`.
     #[inline]
-    pub(super) fn faces_at<'a>(&'a self, complex: &'a Complex, e: u32) -> impl Iterator<Item = u32> + 'a {
-        complex.edge_faces[e as usize].into_iter().filter(|&f| f != NONE && self.faces[f as usize])
+    pub(super) fn faces_at<'a>(
+        &'a self,
+        complex: &'a Complex,
+        e: u32,
+    ) -> impl Iterator<Item = u32> + 'a {
+        complex.edge_faces[e as usize]
+            .into_iter()
+            .filter(|&f| f != NONE && self.faces[f as usize])
     }
 
     /// Sheet of each alive face (named by its smallest face; [`NONE`] for dead faces): faces that
@@ -43,7 +52,15 @@ impl Alive {
                 sets.unite(a, b);
             }
         }
-        (0..complex.faces() as u32).map(|f| if self.faces[f as usize] { sets.find(f) } else { NONE }).collect()
+        (0..complex.faces() as u32)
+            .map(|f| {
+                if self.faces[f as usize] {
+                    sets.find(f)
+                } else {
+                    NONE
+                }
+            })
+            .collect()
     }
 }
 
@@ -71,7 +88,10 @@ impl FaceSpheres {
                 (centre.map(|x| x * share), radius * share)
             })
             .collect();
-        Self { centres: spheres.iter().map(|s| s.0).collect(), radii: spheres.iter().map(|s| s.1).collect() }
+        Self {
+            centres: spheres.iter().map(|s| s.0).collect(),
+            radii: spheres.iter().map(|s| s.1).collect(),
+        }
     }
 }
 
@@ -80,7 +100,10 @@ impl FaceSpheres {
 fn middle(complex: &Complex, e: u32) -> ([f32; 3], f32) {
     let [a, b] = complex.edges[e as usize].map(|v| v as usize);
     let (p, q) = (complex.centres[a], complex.centres[b]);
-    (std::array::from_fn(|k| 0.5 * (p[k] + q[k])), 0.5 * (complex.radii[a] + complex.radii[b]))
+    (
+        std::array::from_fn(|k| 0.5 * (p[k] + q[k])),
+        0.5 * (complex.radii[a] + complex.radii[b]),
+    )
 }
 
 #[inline]
@@ -138,7 +161,9 @@ pub(super) fn burn(
         if !alive.edges[edge as usize] || open[edge as usize] != 1 {
             continue;
         }
-        let Some(face) = alive.faces_at(complex, edge).next() else { continue };
+        let Some(face) = alive.faces_at(complex, edge).next() else {
+            continue;
+        };
         let f = face as usize;
         let centre = spheres.centres[f];
         let time = (start + distance(&centre, &middle(complex, edge).0)).max(spheres.radii[f]);
@@ -180,7 +205,10 @@ pub(super) fn regrow(
     for &Collapse { face, edge } in collapses.iter().rev() {
         let f = face as usize;
         let [p, q] = complex.face_samples[f].map(|s| samples[s as usize]);
-        let apart = (0..3).map(|k| f64::from(p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
+        let apart = (0..3)
+            .map(|k| f64::from(p[k] - q[k]).powi(2))
+            .sum::<f64>()
+            .sqrt();
         if apart <= 2.0 * f64::from(spheres.radii[f]) * least_sine {
             continue;
         }
@@ -190,7 +218,9 @@ pub(super) fn regrow(
         for &e in complex.edges_of(face).iter().filter(|&&e| e != edge) {
             allowed &= alive.edges[e as usize];
             touching = touching.max(alive.faces_at(complex, e).count());
-            outwards |= alive.faces_at(complex, e).any(|g| times[g as usize] >= times[f]);
+            outwards |= alive
+                .faces_at(complex, e)
+                .any(|g| times[g as usize] >= times[f]);
         }
         if allowed && outwards && touching == 1 {
             alive.faces[f] = true;

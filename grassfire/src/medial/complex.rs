@@ -50,14 +50,28 @@ impl Complex {
         complex
     }
 
-    fn vertices(delaunay: &Delaunay, inside: &[u32], samples: &[[i32; 3]], complement: UnionFind) -> Self {
-        let kept: Vec<[u32; 4]> = delaunay.tets.iter().zip(inside).filter(|(_, i)| **i != NONE).map(|(t, _)| t.vertices).collect();
+    fn vertices(
+        delaunay: &Delaunay,
+        inside: &[u32],
+        samples: &[[i32; 3]],
+        complement: UnionFind,
+    ) -> Self {
+        let kept: Vec<[u32; 4]> = delaunay
+            .tets
+            .iter()
+            .zip(inside)
+            .filter(|(_, i)| **i != NONE)
+            .map(|(t, _)| t.vertices)
+            .collect();
         let spheres: Vec<([f32; 3], f32)> = kept
             .par_iter()
             .map(|v| {
                 let centre = circumcentre(v, samples).unwrap_or_default();
                 let p = samples[v[0] as usize];
-                let radius = (0..3).map(|k| (centre[k] - f64::from(p[k])).powi(2)).sum::<f64>().sqrt();
+                let radius = (0..3)
+                    .map(|k| (centre[k] - f64::from(p[k])).powi(2))
+                    .sum::<f64>()
+                    .sqrt();
                 (centre.map(|x| x as f32), radius as f32)
             })
             .collect();
@@ -110,7 +124,15 @@ impl Complex {
             for (bit, [a, b]) in TET_EDGES.into_iter().enumerate() {
                 if walked[v as usize] >> bit & 1 == 0 {
                     let from = self.face_edges.len();
-                    if ring(delaunay, inside, facet_edges, &mut walked, &mut self.face_edges, t, [a, b]) {
+                    if ring(
+                        delaunay,
+                        inside,
+                        facet_edges,
+                        &mut walked,
+                        &mut self.face_edges,
+                        t,
+                        [a, b],
+                    ) {
                         let samples = &delaunay.tets[t].vertices;
                         self.close_face(from, [samples[a], samples[b]]);
                     } else {
@@ -136,7 +158,8 @@ impl Complex {
     /// The edges of face `f`.
     #[inline]
     pub(super) fn edges_of(&self, f: u32) -> &[u32] {
-        &self.face_edges[self.face_start[f as usize] as usize..self.face_start[f as usize + 1] as usize]
+        &self.face_edges
+            [self.face_start[f as usize] as usize..self.face_start[f as usize + 1] as usize]
     }
 
     /// The vertices of face `f` in cyclic order: the common ends of consecutive edges.
@@ -179,8 +202,19 @@ fn edge_bit(a: usize, b: usize) -> usize {
 
 /// Walks round the Delaunay edge (a, b) of tetrahedron `start`, appending the Voronoi edges passed;
 /// false as soon as the ring leaves the inside.
-fn ring(delaunay: &Delaunay, inside: &[u32], facet_edges: &[[u32; 4]], walked: &mut [u8], out: &mut Vec<u32>, start: usize, [a, b]: [usize; 2]) -> bool {
-    let ends = [delaunay.tets[start].vertices[a], delaunay.tets[start].vertices[b]];
+fn ring(
+    delaunay: &Delaunay,
+    inside: &[u32],
+    facet_edges: &[[u32; 4]],
+    walked: &mut [u8],
+    out: &mut Vec<u32>,
+    start: usize,
+    [a, b]: [usize; 2],
+) -> bool {
+    let ends = [
+        delaunay.tets[start].vertices[a],
+        delaunay.tets[start].vertices[b],
+    ];
     let mut exit = (0..4).find(|&k| k != a && k != b).unwrap_or(0);
     let mut t = start;
     loop {
@@ -201,19 +235,24 @@ fn ring(delaunay: &Delaunay, inside: &[u32], facet_edges: &[[u32; 4]], walked: &
         // Enter through facet `mates & 3`; leave through the other facet at the edge.
         let entry = (mates[exit] & 3) as usize;
         let beyond = &delaunay.tets[next].vertices;
-        exit = (0..4).find(|&k| k != entry && !ends.contains(&beyond[k])).unwrap_or(0);
+        exit = (0..4)
+            .find(|&k| k != entry && !ends.contains(&beyond[k]))
+            .unwrap_or(0);
         t = next;
     }
 }
 
 /// Consecutive numbers of the inside tetrahedra, [`NONE`] for the others.
 fn label(delaunay: &Delaunay, samples: &[[i32; 3]], solid: &VoxelSolid) -> Vec<u32> {
-    let inside = |tet: &Tet| circumcentre(&tet.vertices, samples).is_some_and(|c| in_open_solid(&c, solid));
-    let mut number: Vec<u32> = delaunay.tets.par_iter().map(|tet| if inside(tet) { 0 } else { NONE }).collect();
-    let mut count = 0;
-    for n in number.iter_mut().filter(|n| **n != NONE) {
-        *n = count;
-        count += 1;
+    let inside =
+        |tet: &Tet| circumcentre(&tet.vertices, samples).is_some_and(|c| in_open_solid(&c, solid));
+    let mut number: Vec<u32> = delaunay
+        .tets
+        .par_iter()
+        .map(|tet| if inside(tet) { 0 } else { NONE })
+        .collect();
+    for (count, n) in number.iter_mut().filter(|n| **n != NONE).enumerate() {
+        *n = count as u32;
     }
     number
 }
@@ -230,7 +269,8 @@ fn in_open_solid(c: &[f64; 3], solid: &VoxelSolid) -> bool {
         to[k] = floor as i64;
         from[k] = if floor == c[k] { to[k] - 1 } else { to[k] };
     }
-    (from[2]..=to[2]).all(|z| (from[1]..=to[1]).all(|y| (from[0]..=to[0]).all(|x| solid.is_solid([x, y, z]))))
+    (from[2]..=to[2])
+        .all(|z| (from[1]..=to[1]).all(|y| (from[0]..=to[0]).all(|x| solid.is_solid([x, y, z]))))
 }
 
 /// Circumcentre of four lattice points; a coordinate is integral in the result exactly when it
@@ -242,7 +282,13 @@ fn circumcentre(v: &[u32; 4], samples: &[[i32; 3]]) -> Option<[f64; 3]> {
     let p = v.map(|i| samples[i as usize].map(f64::from));
     let [a, b, c] = [1, 2, 3].map(|i| [0, 1, 2].map(|k| p[i][k] - p[0][k]));
     let square = |u: &[f64; 3]| u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
-    let cross = |u: &[f64; 3], w: &[f64; 3]| [u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]];
+    let cross = |u: &[f64; 3], w: &[f64; 3]| {
+        [
+            u[1] * w[2] - u[2] * w[1],
+            u[2] * w[0] - u[0] * w[2],
+            u[0] * w[1] - u[1] * w[0],
+        ]
+    };
     let (bc, ca, ab) = (cross(&b, &c), cross(&c, &a), cross(&a, &b));
     let denominator = 2.0 * (a[0] * bc[0] + a[1] * bc[1] + a[2] * bc[2]);
     if denominator == 0.0 {
@@ -253,7 +299,9 @@ fn circumcentre(v: &[u32; 4], samples: &[[i32; 3]]) -> Option<[f64; 3]> {
     if numerator.iter().any(|x| x.abs() >= EXACT) {
         return Some(wide_circumcentre(&p));
     }
-    Some(std::array::from_fn(|k| p[0][k] + numerator[k] / denominator))
+    Some(std::array::from_fn(|k| {
+        p[0][k] + numerator[k] / denominator
+    }))
 }
 
 /// Integers up to here and their products with small factors are exact in f64.
@@ -265,12 +313,21 @@ fn wide_circumcentre(p: &[[f64; 3]; 4]) -> [f64; 3] {
     let q = p.map(|x| x.map(|x| x as i128));
     let [a, b, c] = [1, 2, 3].map(|i| [0, 1, 2].map(|k| q[i][k] - q[0][k]));
     let square = |u: &[i128; 3]| u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
-    let cross = |u: &[i128; 3], w: &[i128; 3]| [u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]];
+    let cross = |u: &[i128; 3], w: &[i128; 3]| {
+        [
+            u[1] * w[2] - u[2] * w[1],
+            u[2] * w[0] - u[0] * w[2],
+            u[0] * w[1] - u[1] * w[0],
+        ]
+    };
     let (bc, ca, ab) = (cross(&b, &c), cross(&c, &a), cross(&a, &b));
     let denominator = 2 * (a[0] * bc[0] + a[1] * bc[1] + a[2] * bc[2]);
     std::array::from_fn(|k| {
         let numerator = square(&a) * bc[k] + square(&b) * ca[k] + square(&c) * ab[k];
-        let (whole, rest) = (numerator.div_euclid(denominator), numerator.rem_euclid(denominator));
+        let (whole, rest) = (
+            numerator.div_euclid(denominator),
+            numerator.rem_euclid(denominator),
+        );
         // A remainder must not be rounded away to the next integer.
         let fraction = (rest as f64 / denominator.abs() as f64).min(1.0 - 1e-9);
         let fraction = if rest == 0 { 0.0 } else { fraction.max(1e-9) };

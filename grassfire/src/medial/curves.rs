@@ -12,8 +12,6 @@ struct Burnt {
     /// The end that burnt first.
     outer: u32,
     branch: u32,
-    /// Erosion thickness at the inner end is above the limit for tips.
-    solid: bool,
     /// The whole component ends here: nothing of it is left.
     last: bool,
 }
@@ -26,22 +24,27 @@ struct Burnt {
 /// 2. A branch is significant when its erosion thickness at its root exceeds `limit(radius there)`.
 ///    Judging at the root, not edge by edge from the tip, is what keeps lattice zig-zag at the tips
 ///    from blocking the fire.
-/// 3. Keep significant branches without their outermost part, where the thickness is below
-///    `tip_limit(radius there)` (a spur to the surface), and whatever carries something kept. A
-///    component that would vanish keeps one edge.
+/// 3. Keep significant branches and whatever carries something kept. A component that would vanish
+///    keeps one edge.
 ///
 /// Returns the edges kept for that reason.
-pub(super) fn prune_curves(complex: &Complex, alive: &mut Alive, limit: impl Fn(f32) -> f32, tip_limit: impl Fn(f32) -> f32) -> Vec<u32> {
-    let (burnt, significant) = burn_curves(complex, alive, limit, tip_limit);
+pub(super) fn prune_curves(
+    complex: &Complex,
+    alive: &mut Alive,
+    limit: impl Fn(f32) -> f32,
+) -> Vec<u32> {
+    let (burnt, significant) = burn_curves(complex, alive, limit);
     let mut carries = vec![false; complex.radii.len()];
     let mut points = Vec::new();
     for b in &burnt {
-        let kept = carries[b.outer as usize] || (b.solid && significant[b.branch as usize]);
-        if !kept && b.last {
+        let kept = carries[b.outer as usize] || significant[b.branch as usize];
+        let ends = complex.edges[b.edge as usize];
+        let vanishing = b.last && !kept && !ends.iter().any(|&v| carries[v as usize]);
+        if vanishing {
             points.push(b.edge);
         }
-        if kept || b.last {
-            complex.edges[b.edge as usize].iter().for_each(|&v| carries[v as usize] = true);
+        if kept || vanishing {
+            ends.iter().for_each(|&v| carries[v as usize] = true);
         } else {
             alive.edges[b.edge as usize] = false;
         }
@@ -49,17 +52,29 @@ pub(super) fn prune_curves(complex: &Complex, alive: &mut Alive, limit: impl Fn(
     points
 }
 
-fn burn_curves(complex: &Complex, alive: &Alive, limit: impl Fn(f32) -> f32, tip_limit: impl Fn(f32) -> f32) -> (Vec<Burnt>, Vec<bool>) {
-    let is_curve: Vec<bool> =
-        (0..complex.edges.len() as u32).map(|e| alive.edges[e as usize] && alive.faces_at(complex, e).next().is_none()).collect();
+fn burn_curves(
+    complex: &Complex,
+    alive: &Alive,
+    limit: impl Fn(f32) -> f32,
+) -> (Vec<Burnt>, Vec<bool>) {
+    let is_curve: Vec<bool> = (0..complex.edges.len() as u32)
+        .map(|e| alive.edges[e as usize] && alive.faces_at(complex, e).next().is_none())
+        .collect();
     let mut left = is_curve.clone();
     let at = Incidence::of(complex, &is_curve);
     let mut degree = vec![0u32; complex.radii.len()];
-    for (ends, _) in complex.edges.iter().zip(&alive.edges).filter(|(_, alive)| **alive) {
+    for (ends, _) in complex
+        .edges
+        .iter()
+        .zip(&alive.edges)
+        .filter(|(_, alive)| **alive)
+    {
         ends.iter().for_each(|&v| degree[v as usize] += 1);
     }
-    let mut front: BinaryHeap<_> =
-        (0..degree.len()).filter(|&v| degree[v] == 1).map(|v| key(complex.radii[v], v as u32)).collect();
+    let mut front: BinaryHeap<_> = (0..degree.len())
+        .filter(|&v| degree[v] == 1)
+        .map(|v| key(complex.radii[v], v as u32))
+        .collect();
     let mut branch_of = vec![NONE; degree.len()];
     let mut burnt: Vec<Burnt> = Vec::new();
     let mut significant: Vec<bool> = Vec::new();
@@ -73,23 +88,35 @@ fn burn_curves(complex: &Complex, alive: &Alive, limit: impl Fn(f32) -> f32, tip
             significant[branch as usize] = start - radius > limit(radius);
         }
         let edge = at.edges(outer).iter().copied().find(|&e| left[e as usize]);
-        let (1, Some(edge)) = (degree[outer as usize], edge) else { continue };
+        let (1, Some(edge)) = (degree[outer as usize], edge) else {
+            continue;
+        };
         let [a, b] = complex.edges[edge as usize];
         let inner = if a == outer { b } else { a };
         let (o, i) = (outer as usize, inner as usize);
         let branch = if branch == NONE {
             significant.push(false);
-            anchors.push(Anchor { place: complex.centres[o], time: start });
+            anchors.push(Anchor {
+                place: complex.centres[o],
+                time: start,
+            });
             significant.len() as u32 - 1
         } else {
             branch
         };
-        let time = anchors[branch as usize].run_to(&complex.centres[i]).max(start).max(complex.radii[i]);
+        let time = anchors[branch as usize]
+            .run_to(&complex.centres[i])
+            .max(start)
+            .max(complex.radii[i]);
         left[edge as usize] = false;
         degree[o] -= 1;
         degree[i] -= 1;
-        let solid = time - complex.radii[i] > tip_limit(complex.radii[i]);
-        burnt.push(Burnt { edge, outer, branch, solid, last: degree[i] == 0 });
+        burnt.push(Burnt {
+            edge,
+            outer,
+            branch,
+            last: degree[i] == 0,
+        });
         if degree[i] == 1 && at.edges(inner).iter().any(|&e| left[e as usize]) {
             branch_of[i] = branch;
             front.push(key(time, inner));
@@ -98,6 +125,76 @@ fn burn_curves(complex: &Complex, alive: &Alive, limit: impl Fn(f32) -> f32, tip
         }
     }
     (burnt, significant)
+}
+
+/// Cuts back dangling curves to the innermost place whose ball, widened by `tolerance(its radius)`, holds
+/// all balls from there to the tip: what lies beyond is a spur to the surface.
+pub(super) fn trim_tips(complex: &Complex, alive: &mut Alive, tolerance: impl Fn(f32) -> f32) {
+    let is_curve: Vec<bool> = (0..complex.edges.len() as u32)
+        .map(|e| alive.edges[e as usize] && alive.faces_at(complex, e).next().is_none())
+        .collect();
+    let at = Incidence::of(complex, &is_curve);
+    let mut degree = vec![0u32; complex.radii.len()];
+    for (ends, _) in complex
+        .edges
+        .iter()
+        .zip(&alive.edges)
+        .filter(|(_, alive)| **alive)
+    {
+        ends.iter().for_each(|&v| degree[v as usize] += 1);
+    }
+    for tip in (0..degree.len() as u32)
+        .filter(|&v| degree[v as usize] == 1)
+        .collect::<Vec<_>>()
+    {
+        let (vertices, edges) = way_in(complex, alive, &at, &degree, tip);
+        let sphere = |i: usize| {
+            (
+                &complex.centres[vertices[i] as usize],
+                complex.radii[vertices[i] as usize],
+            )
+        };
+        let holds = |&i: &usize| {
+            let (centre, radius) = sphere(i);
+            (0..i)
+                .all(|j| distance(centre, sphere(j).0) + sphere(j).1 <= radius + tolerance(radius))
+        };
+        let Some(cut) = (1..edges.len()).rev().find(holds) else {
+            continue;
+        };
+        for i in 0..cut {
+            alive.edges[edges[i] as usize] = false;
+            degree[vertices[i] as usize] = 0;
+        }
+        degree[vertices[cut] as usize] -= 1;
+    }
+}
+
+/// Vertices and edges from a tip to the next junction, but not much farther than one diameter.
+fn way_in(
+    complex: &Complex,
+    alive: &Alive,
+    at: &Incidence,
+    degree: &[u32],
+    tip: u32,
+) -> (Vec<u32>, Vec<u32>) {
+    let (mut vertices, mut edges) = (vec![tip], Vec::new());
+    let mut v = tip;
+    while let Some(&e) = at
+        .edges(v)
+        .iter()
+        .find(|e| alive.edges[**e as usize] && edges.last() != Some(*e))
+    {
+        let [a, b] = complex.edges[e as usize];
+        v = if a == v { b } else { a };
+        vertices.push(v);
+        edges.push(e);
+        let away = distance(&complex.centres[tip as usize], &complex.centres[v as usize]);
+        if degree[v as usize] != 2 || away > 2.0 * complex.radii[v as usize] + 2.0 * CHORD {
+            break;
+        }
+    }
+    (vertices, edges)
 }
 
 /// Where and when a fire last set its bearings: it is timed along chords of [`CHORD`] voxels, for a
@@ -116,7 +213,10 @@ impl Anchor {
         let chord = distance(&self.place, place);
         let time = self.time + chord;
         if chord >= CHORD {
-            *self = Self { place: *place, time };
+            *self = Self {
+                place: *place,
+                time,
+            };
         }
         time
     }
@@ -131,7 +231,14 @@ struct Incidence {
 impl Incidence {
     fn of(complex: &Complex, wanted: &[bool]) -> Self {
         let mut start = vec![0u32; complex.radii.len() + 1];
-        let ends = || complex.edges.iter().enumerate().filter(|(e, _)| wanted[*e]).flat_map(|(e, ends)| ends.map(|v| (v as usize, e as u32)));
+        let ends = || {
+            complex
+                .edges
+                .iter()
+                .enumerate()
+                .filter(|(e, _)| wanted[*e])
+                .flat_map(|(e, ends)| ends.map(|v| (v as usize, e as u32)))
+        };
         ends().for_each(|(v, _)| start[v + 1] += 1);
         for v in 0..complex.radii.len() {
             start[v + 1] += start[v];

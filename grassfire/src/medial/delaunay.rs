@@ -68,12 +68,19 @@ pub fn delaunay(points: &[Vec3], monitor: &Monitor) -> Result<Delaunay, MedialEr
                 return Err(MedialError::NotFinite { index });
             }
             if value.abs() > LARGEST {
-                return Err(MedialError::TooLarge { index, value, limit: LARGEST });
+                return Err(MedialError::TooLarge {
+                    index,
+                    value,
+                    limit: LARGEST,
+                });
             }
         }
     }
     let flush = |x: f64| if x.abs() < SMALLEST { 0.0 } else { x };
-    let points = points.iter().map(|p| [flush(p.x), flush(p.y), flush(p.z)]).collect();
+    let points = points
+        .iter()
+        .map(|p| [flush(p.x), flush(p.y), flush(p.z)])
+        .collect();
     triangulate(points, FloatKernel, monitor)
 }
 
@@ -91,7 +98,11 @@ pub fn delaunay_lattice(points: &[[i32; 3]], monitor: &Monitor) -> Result<Delaun
         let p = p.map(f64::from);
         for k in 0..3 {
             if p[k].abs() > limit {
-                return Err(MedialError::TooLarge { index, value: p[k], limit });
+                return Err(MedialError::TooLarge {
+                    index,
+                    value: p[k],
+                    limit,
+                });
             }
             low[k] = low[k].min(p[k]);
             high[k] = high[k].max(p[k]);
@@ -105,9 +116,16 @@ pub fn delaunay_lattice(points: &[[i32; 3]], monitor: &Monitor) -> Result<Delaun
     }
 }
 
-fn triangulate<K: Kernel>(points: Vec<Point>, kernel: K, monitor: &Monitor) -> Result<Delaunay, MedialError> {
+fn triangulate<K: Kernel>(
+    points: Vec<Point>,
+    kernel: K,
+    monitor: &Monitor,
+) -> Result<Delaunay, MedialError> {
     if points.len() > MOST_POINTS {
-        return Err(MedialError::TooMany { count: points.len(), limit: MOST_POINTS });
+        return Err(MedialError::TooMany {
+            count: points.len(),
+            limit: MOST_POINTS,
+        });
     }
     let order = insertion_order(&points);
     let mut sorted = Vec::with_capacity(points.len() + 1);
@@ -129,7 +147,10 @@ fn triangulate<K: Kernel>(points: Vec<Point>, kernel: K, monitor: &Monitor) -> R
 
 /// Four points that span space, positively oriented.
 fn first_tet<K: Kernel>(points: &[Point], kernel: K) -> Result<[u32; 4], MedialError> {
-    let flat = |dimension| MedialError::Flat { points: points.len() - 1, dimension };
+    let flat = |dimension| MedialError::Flat {
+        points: points.len() - 1,
+        dimension,
+    };
     let n = points.len();
     let a = points.get(1).ok_or(flat(0))?;
     let i = (2..n).find(|&i| points[i] != *a).ok_or(flat(0))?;
@@ -146,7 +167,9 @@ fn first_tet<K: Kernel>(points: &[Point], kernel: K) -> Result<[u32; 4], MedialE
     };
     let j = (i + 1..n).find(|&j| spans(&points[j])).ok_or(flat(1))?;
     let c = points[j];
-    let l = (j + 1..n).find(|&l| kernel.orient(a, &b, &c, &points[l]) != 0.0).ok_or(flat(2))?;
+    let l = (j + 1..n)
+        .find(|&l| kernel.orient(a, &b, &c, &points[l]) != 0.0)
+        .ok_or(flat(2))?;
     let mut first = [1, i as u32, j as u32, l as u32];
     if kernel.orient(a, &b, &c, &points[l]) < 0.0 {
         first.swap(0, 1);
@@ -183,12 +206,18 @@ struct Builder<K> {
 impl<K: Kernel> Builder<K> {
     fn new(points: Vec<Point>, kernel: K, first: [u32; 4]) -> Self {
         let mut tets = Vec::with_capacity(points.len().saturating_mul(7) + 64);
-        tets.push(Tet { vertices: first, mates: [NONE; 4] });
+        tets.push(Tet {
+            vertices: first,
+            mates: [NONE; 4],
+        });
         for k in 0..4 {
             let mut vertices = first;
             vertices[k] = GHOST;
             vertices.swap((k + 1) % 4, (k + 2) % 4);
-            tets.push(Tet { vertices, mates: [NONE; 4] });
+            tets.push(Tet {
+                vertices,
+                mates: [NONE; 4],
+            });
         }
         let facet = |t: &Tet, k: usize| {
             let mut v = t.vertices;
@@ -266,7 +295,10 @@ impl<K: Kernel> Builder<K> {
             if tet.vertices.contains(&GHOST) {
                 return Ok(t);
             }
-            self.random = self.random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            self.random = self
+                .random
+                .wrapping_mul(1_664_525)
+                .wrapping_add(1_013_904_223);
             let turn = (self.random >> 30) as usize;
             let exit = (0..4).map(|j| (j + turn) & 3).find(|&k| {
                 let mut v = tet.vertices;
@@ -278,13 +310,20 @@ impl<K: Kernel> Builder<K> {
             entered = (tet.mates[k] & 3) as usize;
         }
         // Cannot happen with exact predicates: a visibility walk in a Delaunay triangulation ends.
-        Err(MedialError::Internal { what: "the walk to a point did not end", index: p as usize })
+        Err(MedialError::Internal {
+            what: "the walk to a point did not end",
+            index: p as usize,
+        })
     }
 
     fn insert(&mut self, p: u32) -> Result<(), MedialError> {
         let start = self.locate(p)?;
         let place = self.points[p as usize];
-        if self.tets[start as usize].vertices.iter().any(|&v| v != GHOST && self.points[v as usize] == place) {
+        if self.tets[start as usize]
+            .vertices
+            .iter()
+            .any(|&v| v != GHOST && self.points[v as usize] == place)
+        {
             return Ok(());
         }
         self.insertion += 1;
@@ -337,7 +376,10 @@ impl<K: Kernel> Builder<K> {
             let slot = match self.cavity.get(i).copied().or_else(|| self.free.pop()) {
                 Some(slot) => slot,
                 None => {
-                    self.tets.push(Tet { vertices, mates: [NONE; 4] });
+                    self.tets.push(Tet {
+                        vertices,
+                        mates: [NONE; 4],
+                    });
                     self.marks.push(0);
                     (self.tets.len() - 1) as u32
                 }
@@ -386,9 +428,11 @@ impl<K: Kernel> Builder<K> {
         }
         for i in 0..self.cone.len() {
             let (vertices, k, _) = self.cone[i];
-            let number = vertices.map(|v| (self.local[v as usize].wrapping_sub(base) as usize) & (TABLE - 1));
+            let number = vertices
+                .map(|v| (self.local[v as usize].wrapping_sub(base) as usize) & (TABLE - 1));
             for [j, x, y] in EVEN[usize::from(k)] {
-                self.tets[self.fresh[i] as usize].mates[j] = self.table[number[y] * TABLE + number[x]];
+                self.tets[self.fresh[i] as usize].mates[j] =
+                    self.table[number[y] * TABLE + number[x]];
             }
         }
         true
@@ -413,7 +457,13 @@ impl<K: Kernel> Builder<K> {
 
     /// Drops ghosts and unused slots and names the vertices by input index.
     fn finish(self, order: &[u32]) -> Delaunay {
-        let Self { mut tets, marks: mut place, points, local, .. } = self;
+        let Self {
+            mut tets,
+            marks: mut place,
+            points,
+            local,
+            ..
+        } = self;
         drop((points, local));
         let mut count = 0;
         for (tet, place) in tets.iter().zip(&mut place) {

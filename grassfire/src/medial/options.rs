@@ -8,6 +8,9 @@ use crate::topology::Betti;
 /// What [`medial_axis`](super::medial_axis) keeps. Erosion thickness is how much longer than its radius R a
 /// place of the medial axis lasts in the grassfire; in a bar of half thickness a and half width b it is
 /// 0.41 a on the corner sheets and 0.41 a + x on the middle sheet, x from its end.
+///
+/// The ratios decide, so that results hardly depend on the resolution; the limits in voxels only
+/// matter for members less than about five voxels thick, where lattice noise is not small against the radius.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MedialOptions {
@@ -25,7 +28,8 @@ pub struct MedialOptions {
     pub curve_noise: f64,
     /// Least erosion thickness of a dangling curve at its root as a multiple of the radius there.
     pub curve_ratio: f64,
-    /// A kept dangling curve ends where its erosion thickness is this multiple of the radius (at least a voxel).
+    /// A dangling curve is cut back to a ball that holds all beyond it but this multiple of its radius
+    /// (at least two voxels).
     pub tip_ratio: f64,
     /// Weight of the old sphere against its surface planes when spheres are refitted.
     pub refit_rest: f64,
@@ -37,12 +41,12 @@ impl Default for MedialOptions {
     fn default() -> Self {
         Self {
             sheet_noise: 2.5,
-            sheet_ratio: 0.5,
-            ribbon_ratio: 1.0,
+            sheet_ratio: 0.75,
+            ribbon_ratio: 2.0,
             regrow_sine: 0.75,
             island_ratio: 3.0,
             curve_noise: 4.0,
-            curve_ratio: 1.2,
+            curve_ratio: 1.6,
             tip_ratio: 0.25,
             refit_rest: 0.3,
             refit_move: 1.5,
@@ -61,9 +65,9 @@ impl MedialOptions {
         (self.curve_noise as f32).max(self.curve_ratio as f32 * r)
     }
 
-    /// Erosion thickness (voxels) where a kept dangling curve of radius `r` (voxels) ends.
+    /// How far (voxels) balls may stick out of a tip's ball of radius `r` (voxels) and still count as a spur.
     pub(super) fn tip_limit(&self, r: f32) -> f32 {
-        (self.tip_ratio as f32 * r).max(1.0)
+        (self.tip_ratio as f32 * r).max(2.0)
     }
 
     pub(super) fn check(&self) -> Result<(), MedialError> {
@@ -79,7 +83,10 @@ impl MedialOptions {
             ("refit_rest", self.refit_rest),
             ("refit_move", self.refit_move),
         ];
-        match options.into_iter().find(|(_, value)| !(value.is_finite() && *value >= 0.0)) {
+        match options
+            .into_iter()
+            .find(|(_, value)| !(value.is_finite() && *value >= 0.0))
+        {
             Some((name, value)) => Err(MedialError::BadOption { name, value }),
             None => Ok(()),
         }

@@ -41,10 +41,11 @@ pub struct Poles {
 /// Inner pole of every surface point.
 ///
 /// 1. Delaunay triangulation of the points; Voronoi vertices are the circumcentres.
-/// 2. The inner pole of a point is the farthest vertex of its Voronoi cell on the inner side of its
-///    tangent plane. Unbounded cells need no care: they are unbounded outwards. Centres of flat
-///    tetrahedra and centres outside the bounding box are left out.
-/// 3. Points without a pole (duplicates, flat surroundings) take the mean radius of their
+/// 2. A Voronoi vertex counts as inside when it lies on the inner side of the tangent planes of at least three
+///    of its four points (they are the nearest ones). Centres of flat tetrahedra are left out.
+/// 3. The inner pole of a point is the farthest inside vertex of its Voronoi cell on the inner side of its
+///    tangent plane. Unbounded cells need no care: they are unbounded outwards.
+/// 4. Points without a pole (duplicates, flat surroundings) take the mean radius of their
 ///    neighbours along the inward normal; how many is reported as a warning.
 ///
 /// The surface should be sampled finer than it is thick. This is a measure of thickness and a picture,
@@ -56,10 +57,17 @@ pub struct Poles {
 /// # Sources
 /// N. Amenta, S. Choi, R. K. Kolluri, "The power crust, unions of balls, and the medial axis transform",
 /// Computational Geometry 19 (2001), <https://doi.org/10.1016/S0925-7721(01)00017-7>.
-pub fn poles(solid: &Solid, options: &PoleOptions, monitor: &Monitor) -> Result<Poles, MedialError> {
+pub fn poles(
+    solid: &Solid,
+    options: &PoleOptions,
+    monitor: &Monitor,
+) -> Result<Poles, MedialError> {
     let limit = options.least_volume;
     if !(limit.is_finite() && limit >= 0.0) {
-        return Err(MedialError::BadOption { name: "least_volume", value: limit });
+        return Err(MedialError::BadOption {
+            name: "least_volume",
+            value: limit,
+        });
     }
     monitor.step("medial", "poles", 0.0)?;
     let mesh = solid.mesh();
@@ -67,14 +75,32 @@ pub fn poles(solid: &Solid, options: &PoleOptions, monitor: &Monitor) -> Result<
     let normals = normals(mesh);
     let farthest = farthest_centres(mesh, &triangulation, &normals, limit);
     drop(triangulation);
-    let mut radii: Vec<f64> = mesh.points.iter().zip(&farthest).map(|(p, c)| c.map_or(f64::NAN, |c| (c - p).norm())).collect();
+    let mut radii: Vec<f64> = mesh
+        .points
+        .iter()
+        .zip(&farthest)
+        .map(|(p, c)| c.map_or(f64::NAN, |c| (c - p).norm()))
+        .collect();
     let missing = radii.iter().filter(|r| r.is_nan()).count();
     if missing > 0 {
         fill_from_neighbours(mesh, &mut radii);
-        monitor.warn("medial", format!("{missing} of {} surface points have no inner pole; neighbours stand in", radii.len()));
+        monitor.warn(
+            "medial",
+            format!(
+                "{missing} of {} surface points have no inner pole; neighbours stand in",
+                radii.len()
+            ),
+        );
     }
-    let points = (0..radii.len()).map(|v| farthest[v].unwrap_or_else(|| mesh.points[v] - normals[v] * radii[v])).collect();
-    Ok(Poles { points, thickness: radii.clone(), radii, triangles: mesh.triangles.clone() })
+    let points = (0..radii.len())
+        .map(|v| farthest[v].unwrap_or_else(|| mesh.points[v] - normals[v] * radii[v]))
+        .collect();
+    Ok(Poles {
+        points,
+        thickness: radii.clone(),
+        radii,
+        triangles: mesh.triangles.clone(),
+    })
 }
 
 /// Unit normals of the points, weighted by area.
@@ -85,17 +111,27 @@ fn normals(mesh: &TriMesh) -> Vec<Vec3> {
         let normal = (b - a).cross(&(c - a));
         triangle.iter().for_each(|&v| normals[v as usize] += normal);
     }
-    normals.iter().map(|n| n.try_normalize(1e-300).unwrap_or_default()).collect()
+    normals
+        .iter()
+        .map(|n| n.try_normalize(1e-300).unwrap_or_default())
+        .collect()
 }
 
-fn farthest_centres(mesh: &TriMesh, triangulation: &Delaunay, normals: &[Vec3], least_volume: f64) -> Vec<Option<Vec3>> {
-    let (low, high) = mesh.bounds().unwrap_or_default();
+fn farthest_centres(
+    mesh: &TriMesh,
+    triangulation: &Delaunay,
+    normals: &[Vec3],
+    least_volume: f64,
+) -> Vec<Option<Vec3>> {
     let centres: Vec<Option<Vec3>> = triangulation
         .tets
         .par_iter()
         .map(|tet| {
             let corners = tet.vertices.map(|v| mesh.points[v as usize]);
-            circumcentre(&corners, least_volume).filter(|c| low.inf(c) == low && high.sup(c) == high)
+            let below =
+                |c: &Vec3, k: usize| (c - corners[k]).dot(&normals[tet.vertices[k] as usize]) < 0.0;
+            circumcentre(&corners, least_volume)
+                .filter(|c| (0..4).filter(|&k| below(c, k)).count() >= 3)
         })
         .collect();
     let mut farthest: Vec<Option<(f64, Vec3)>> = vec![None; mesh.points.len()];
@@ -104,12 +140,16 @@ fn farthest_centres(mesh: &TriMesh, triangulation: &Delaunay, normals: &[Vec3], 
         for v in tet.vertices.map(|v| v as usize) {
             let away = centre - mesh.points[v];
             let distance = away.norm_squared();
-            if away.dot(&normals[v]) < 0.0 && farthest[v].is_none_or(|(known, _)| distance > known) {
+            if away.dot(&normals[v]) < 0.0 && farthest[v].is_none_or(|(known, _)| distance > known)
+            {
                 farthest[v] = Some((distance, *centre));
             }
         }
     }
-    farthest.into_iter().map(|f| f.map(|(_, centre)| centre)).collect()
+    farthest
+        .into_iter()
+        .map(|f| f.map(|(_, centre)| centre))
+        .collect()
 }
 
 fn circumcentre(corners: &[Vec3; 4], least_volume: f64) -> Option<Vec3> {
@@ -119,19 +159,29 @@ fn circumcentre(corners: &[Vec3; 4], least_volume: f64) -> Option<Vec3> {
     if volume.abs() <= least_volume * a.norm() * b.norm() * c.norm() {
         return None;
     }
-    let centre = corners[0] + (a.norm_squared() * bc + b.norm_squared() * ca + c.norm_squared() * ab) / (2.0 * volume);
+    let centre = corners[0]
+        + (a.norm_squared() * bc + b.norm_squared() * ca + c.norm_squared() * ab) / (2.0 * volume);
     centre.iter().all(|x| x.is_finite()).then_some(centre)
 }
 
 /// Spreads radii over the edges into the points that have none (NaN); zero where nothing is in reach.
 fn fill_from_neighbours(mesh: &TriMesh, radii: &mut [f64]) {
     let touches_gap = |radii: &[f64], t: &[u32; 3]| t.iter().any(|&v| radii[v as usize].is_nan());
-    let mut open: Vec<[u32; 3]> = mesh.triangles.iter().copied().filter(|t| touches_gap(radii, t)).collect();
+    let mut open: Vec<[u32; 3]> = mesh
+        .triangles
+        .iter()
+        .copied()
+        .filter(|t| touches_gap(radii, t))
+        .collect();
     loop {
         let mut sums = std::collections::BTreeMap::<u32, (f64, f64)>::new();
         for t in &open {
             for v in t.iter().filter(|&&v| radii[v as usize].is_nan()) {
-                for r in t.map(|w| radii[w as usize]).into_iter().filter(|r| !r.is_nan()) {
+                for r in t
+                    .map(|w| radii[w as usize])
+                    .into_iter()
+                    .filter(|r| !r.is_nan())
+                {
                     let sum = sums.entry(*v).or_default();
                     *sum = (sum.0 + r, sum.1 + 1.0);
                 }
@@ -140,8 +190,12 @@ fn fill_from_neighbours(mesh: &TriMesh, radii: &mut [f64]) {
         if sums.is_empty() {
             break;
         }
-        sums.iter().for_each(|(&v, (sum, count))| radii[v as usize] = sum / count);
+        sums.iter()
+            .for_each(|(&v, (sum, count))| radii[v as usize] = sum / count);
         open.retain(|t| touches_gap(radii, t));
     }
-    radii.iter_mut().filter(|r| r.is_nan()).for_each(|r| *r = 0.0);
+    radii
+        .iter_mut()
+        .filter(|r| r.is_nan())
+        .for_each(|r| *r = 0.0);
 }

@@ -43,13 +43,21 @@ fn minus(a: &Point, b: &Point) -> Point {
 
 #[inline(always)]
 fn orient_determinant(a: &Point, b: &Point, c: &Point) -> f64 {
-    a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+    a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
 }
 
 #[inline(always)]
 fn insphere_determinant(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {
     let minor = |p: &Point, q: &Point| p[0] * q[1] - q[0] * p[1];
-    let (ab, bc, cd, da, ac, bd) = (minor(a, b), minor(b, c), minor(c, d), minor(d, a), minor(a, c), minor(b, d));
+    let (ab, bc, cd, da, ac, bd) = (
+        minor(a, b),
+        minor(b, c),
+        minor(c, d),
+        minor(d, a),
+        minor(a, c),
+        minor(b, d),
+    );
     let abc = a[2] * bc - b[2] * ac + c[2] * ab;
     let bcd = b[2] * cd - c[2] * bd + d[2] * bc;
     let cda = c[2] * da + d[2] * ac + a[2] * cd;
@@ -60,7 +68,11 @@ fn insphere_determinant(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {
 
 #[inline(always)]
 fn coordinate(p: &Point) -> robust::Coord3D<f64> {
-    robust::Coord3D { x: p[0], y: p[1], z: p[2] }
+    robust::Coord3D {
+        x: p[0],
+        y: p[1],
+        z: p[2],
+    }
 }
 
 impl Kernel for FloatKernel {
@@ -87,7 +99,13 @@ impl Kernel for FloatKernel {
         if determinant > error || determinant < -error {
             return determinant;
         }
-        robust::insphere(coordinate(a), coordinate(b), coordinate(c), coordinate(d), coordinate(e))
+        robust::insphere(
+            coordinate(a),
+            coordinate(b),
+            coordinate(c),
+            coordinate(d),
+            coordinate(e),
+        )
     }
 }
 
@@ -125,7 +143,14 @@ impl Kernel for LatticeKernel {
 fn insphere_integer(rows: &[Point; 4]) -> f64 {
     let [a, b, c, d] = rows.map(|p| p.map(|x| x as i128));
     let minor = |p: &[i128; 3], q: &[i128; 3]| p[0] * q[1] - q[0] * p[1];
-    let (ab, bc, cd, da, ac, bd) = (minor(&a, &b), minor(&b, &c), minor(&c, &d), minor(&d, &a), minor(&a, &c), minor(&b, &d));
+    let (ab, bc, cd, da, ac, bd) = (
+        minor(&a, &b),
+        minor(&b, &c),
+        minor(&c, &d),
+        minor(&d, &a),
+        minor(&a, &c),
+        minor(&b, &d),
+    );
     let abc = a[2] * bc - b[2] * ac + c[2] * ab;
     let bcd = b[2] * cd - c[2] * bd + d[2] * bc;
     let cda = c[2] * da + d[2] * ac + a[2] * cd;
@@ -139,14 +164,23 @@ fn insphere_integer(rows: &[Point; 4]) -> f64 {
 mod tests {
     use super::*;
 
-    const CUBE: [Point; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    const CUBE: [Point; 4] = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+    ];
 
     #[test]
     fn kernels_agree_on_the_unit_corner() {
         // a, b swapped so that the orientation is positive in this sign convention.
         let [b, a, c, d] = CUBE;
         assert!(FloatKernel.orient(&a, &b, &c, &d) > 0.0);
-        for (e, sign) in [([1.0, 1.0, 1.0], 0.0), ([2.0, 1.0, 1.0], -1.0), ([0.25, 0.25, 0.25], 1.0)] {
+        for (e, sign) in [
+            ([1.0, 1.0, 1.0], 0.0),
+            ([2.0, 1.0, 1.0], -1.0),
+            ([0.25, 0.25, 0.25], 1.0),
+        ] {
             for value in [
                 FloatKernel.insphere(&a, &b, &c, &d, &e),
                 SmallLatticeKernel.insphere(&a, &b, &c, &d, &e),
@@ -162,7 +196,13 @@ mod tests {
         let s = 90_000.0;
         let [b, a, c, d] = CUBE.map(|p| p.map(|x| x * s));
         assert_eq!(LatticeKernel.insphere(&a, &b, &c, &d, &[s, s, s]), 0.0);
-        assert_eq!(LatticeKernel.insphere(&a, &b, &c, &d, &[s, s, s - 1.0]), 1.0);
-        assert_eq!(LatticeKernel.insphere(&a, &b, &c, &d, &[s, s, s + 1.0]), -1.0);
+        assert_eq!(
+            LatticeKernel.insphere(&a, &b, &c, &d, &[s, s, s - 1.0]),
+            1.0
+        );
+        assert_eq!(
+            LatticeKernel.insphere(&a, &b, &c, &d, &[s, s, s + 1.0]),
+            -1.0
+        );
     }
 }

@@ -58,19 +58,32 @@ pub(super) fn refit(
             }
             let share = 1.0 / (4 * members.len()) as f64;
             matrix = matrix * share + Matrix4::identity() * options.refit_rest;
-            let change = matrix.cholesky().map_or(Vector4::zeros(), |c| c.solve(&(vector * share)));
+            let change = matrix
+                .cholesky()
+                .map_or(Vector4::zeros(), |c| c.solve(&(vector * share)));
             let step = change.xyz();
             let scale = (options.refit_move * h / step.norm().max(1e-12 * h)).min(1.0);
-            (old + step * scale, (old_radius + change.w).max(0.25 * old_radius))
+            (
+                old + step * scale,
+                (old_radius + change.w).max(0.25 * old_radius),
+            )
         })
         .collect();
     groups.of.iter().map(|&g| fitted[g as usize]).collect()
 }
 
 /// Point and outward unit normal of the surface at each sample of the wanted spheres.
-fn surface_planes(complex: &Complex, wanted: &[u32], samples: &[[i32; 3]], field: &VoxelGrid<f32>) -> Vec<Option<(Vec3, Vec3)>> {
+fn surface_planes(
+    complex: &Complex,
+    wanted: &[u32],
+    samples: &[[i32; 3]],
+    field: &VoxelGrid<f32>,
+) -> Vec<Option<(Vec3, Vec3)>> {
     let mut used = vec![false; samples.len()];
-    wanted.iter().flat_map(|&v| complex.vertex_samples[v as usize]).for_each(|s| used[s as usize] = true);
+    wanted
+        .iter()
+        .flat_map(|&v| complex.vertex_samples[v as usize])
+        .for_each(|s| used[s as usize] = true);
     let place = |s: &[i32; 3]| {
         let h = field.spacing;
         let mut p = to_mm(field, &s.map(|x| x as f32));
@@ -82,7 +95,11 @@ fn surface_planes(complex: &Complex, wanted: &[u32], samples: &[[i32; 3]], field
         let gradient = field.gradient(&p);
         (p, -gradient.try_normalize(1e-12).unwrap_or_default())
     };
-    samples.par_iter().zip(&used).map(|(s, &used)| used.then(|| place(s))).collect()
+    samples
+        .par_iter()
+        .zip(&used)
+        .map(|(s, &used)| used.then(|| place(s)))
+        .collect()
 }
 
 /// Wanted vertices by place.
@@ -99,7 +116,10 @@ fn coincident_groups(complex: &Complex, wanted: &[u32]) -> Groups {
     wanted.iter().for_each(|&v| is_wanted[v as usize] = true);
     for &[a, b] in &complex.edges {
         let (p, q) = (&complex.centres[a as usize], &complex.centres[b as usize]);
-        if is_wanted[a as usize] && is_wanted[b as usize] && (0..3).all(|k| (p[k] - q[k]).abs() < COINCIDENT) {
+        if is_wanted[a as usize]
+            && is_wanted[b as usize]
+            && (0..3).all(|k| (p[k] - q[k]).abs() < COINCIDENT)
+        {
             sets.unite(a, b);
         }
     }

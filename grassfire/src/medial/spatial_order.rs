@@ -80,7 +80,9 @@ fn hilbert(mut x: [u32; 3]) -> u64 {
         q >>= 1;
     }
     x.iter_mut().for_each(|v| *v ^= t);
-    (0..BITS).rev().fold(0, |h, bit| x.iter().fold(h, |h, v| h << 1 | u64::from(v >> bit & 1)))
+    (0..BITS).rev().fold(0, |h, bit| {
+        x.iter().fold(h, |h, v| h << 1 | u64::from(v >> bit & 1))
+    })
 }
 
 #[cfg(test)]
@@ -89,7 +91,9 @@ mod tests {
 
     #[test]
     fn order_is_a_permutation() {
-        let points: Vec<Point> = (0..3000).map(|i| [f64::from(i % 17), f64::from(i % 13), f64::from(i % 7)]).collect();
+        let points: Vec<Point> = (0..3000)
+            .map(|i| [f64::from(i % 17), f64::from(i % 13), f64::from(i % 7)])
+            .collect();
         let mut order = insertion_order(&points);
         order.sort_unstable();
         assert!(order.iter().enumerate().all(|(i, &o)| i as u32 == o));

@@ -8,7 +8,10 @@ pub(super) struct UnionFind {
 
 impl UnionFind {
     pub(super) fn new(n: usize) -> Self {
-        Self { parent: (0..n as u32).collect(), sets: n }
+        Self {
+            parent: (0..n as u32).collect(),
+            sets: n,
+        }
     }
 
     /// Name of the set of `x`: its smallest member, so that names do not depend on the order of unions.

@@ -19,18 +19,21 @@ impl VoxelSolid {
         let [nx, ny, nz] = field.dims;
         let dims = [nx + 2, ny + 2, nz + 2];
         let mut solid = vec![false; dims[0] * dims[1] * dims[2]];
-        solid.par_chunks_mut(dims[0] * dims[1]).enumerate().for_each(|(k, layer)| {
-            if k == 0 || k > nz {
-                return;
-            }
-            for j in 0..ny {
-                let row = ((k - 1) * ny + j) * nx;
-                let into = &mut layer[(j + 1) * dims[0] + 1..][..nx];
-                for (s, &f) in into.iter_mut().zip(&field.values[row..row + nx]) {
-                    *s = f > 0.0;
+        solid
+            .par_chunks_mut(dims[0] * dims[1])
+            .enumerate()
+            .for_each(|(k, layer)| {
+                if k == 0 || k > nz {
+                    return;
                 }
-            }
-        });
+                for j in 0..ny {
+                    let row = ((k - 1) * ny + j) * nx;
+                    let into = &mut layer[(j + 1) * dims[0] + 1..][..nx];
+                    for (s, &f) in into.iter_mut().zip(&field.values[row..row + nx]) {
+                        *s = f > 0.0;
+                    }
+                }
+            });
         Self { dims, solid }
     }
 
@@ -38,7 +41,10 @@ impl VoxelSolid {
     #[inline]
     pub(super) fn is_solid(&self, at: [i64; 3]) -> bool {
         let [nx, ny, _] = self.dims;
-        let inside = at.iter().zip(self.dims).all(|(&x, n)| x >= 0 && x < n as i64);
+        let inside = at
+            .iter()
+            .zip(self.dims)
+            .all(|(&x, n)| x >= 0 && x < n as i64);
         inside && self.solid[(at[2] as usize * ny + at[1] as usize) * nx + at[0] as usize]
     }
 
@@ -56,8 +62,11 @@ impl VoxelSolid {
                 let mut corners = Vec::new();
                 let mut chi = 0;
                 for y in 1..ny {
-                    let rows = [(y - 1, z - 1), (y, z - 1), (y - 1, z), (y, z)].map(|(j, k)| &self.solid[(k * ny + j) * nx..][..nx]);
-                    let column = |x: usize| (0..4).fold(0usize, |bits, r| bits | usize::from(rows[r][x]) << r);
+                    let rows = [(y - 1, z - 1), (y, z - 1), (y - 1, z), (y, z)]
+                        .map(|(j, k)| &self.solid[(k * ny + j) * nx..][..nx]);
+                    let column = |x: usize| {
+                        (0..4).fold(0usize, |bits, r| bits | usize::from(rows[r][x]) << r)
+                    };
                     let mut back = column(0);
                     for x in 1..nx {
                         let front = column(x);
@@ -79,7 +88,10 @@ impl VoxelSolid {
     /// Betti numbers: 6-connected solid components, cavities as 26-connected empty components
     /// that do not reach the outside, loops from the Euler number `chi` of [`Self::corners`].
     pub(super) fn betti(&self, chi: i64) -> Betti {
-        let (solid, empty) = rayon::join(|| self.components(true, false), || self.components(false, true));
+        let (solid, empty) = rayon::join(
+            || self.components(true, false),
+            || self.components(false, true),
+        );
         Betti::from_chi(solid as i64, empty as i64 - 1, chi)
     }
 
@@ -163,8 +175,23 @@ impl Runs {
 /// Of each pattern of a 2x2x2 block (bit = dy + 2 dz + 4 dx): cells of the dual complex that have
 /// the block's lowest voxel as their lowest.
 fn euler_table() -> [i64; 256] {
-    let cells = [(1, 0b1), (-1, 0b11), (-1, 0b101), (-1, 0b1_0001), (1, 0b1111), (1, 0b11_0011), (1, 0b101_0101), (-1, 0b1111_1111)];
-    std::array::from_fn(|block| cells.iter().filter(|cell| block & cell.1 == cell.1).map(|cell| cell.0).sum())
+    let cells = [
+        (1, 0b1),
+        (-1, 0b11),
+        (-1, 0b101),
+        (-1, 0b1_0001),
+        (1, 0b1111),
+        (1, 0b11_0011),
+        (1, 0b101_0101),
+        (-1, 0b1111_1111),
+    ];
+    std::array::from_fn(|block| {
+        cells
+            .iter()
+            .filter(|cell| block & cell.1 == cell.1)
+            .map(|cell| cell.0)
+            .sum()
+    })
 }
 
 #[cfg(test)]
@@ -186,11 +213,21 @@ mod tests {
     #[test]
     fn simple_solids() {
         assert_eq!(betti([1, 1, 1], |_, _, _| true), Betti::from_chi(1, 0, 1));
-        assert_eq!(betti([3, 3, 3], |i, j, k| [i, j, k] != [1, 1, 1]), Betti::from_chi(1, 1, 2));
-        assert_eq!(betti([3, 3, 1], |i, j, _| [i, j] != [1, 1]), Betti::from_chi(1, 0, 0));
+        assert_eq!(
+            betti([3, 3, 3], |i, j, k| [i, j, k] != [1, 1, 1]),
+            Betti::from_chi(1, 1, 2)
+        );
+        assert_eq!(
+            betti([3, 3, 1], |i, j, _| [i, j] != [1, 1]),
+            Betti::from_chi(1, 0, 0)
+        );
         // Two voxels that touch along an edge are two components, and a hole closed only by edges is none.
         assert_eq!(betti([2, 2, 1], |i, j, _| i == j), Betti::from_chi(2, 0, 2));
-        assert_eq!(betti([3, 3, 3], |i, j, k| (i, j, k) != (1, 1, 1) && (i, j, k) != (0, 0, 1)), Betti::from_chi(1, 0, 1));
+        assert_eq!(
+            betti([3, 3, 3], |i, j, k| (i, j, k) != (1, 1, 1)
+                && (i, j, k) != (0, 0, 1)),
+            Betti::from_chi(1, 0, 1)
+        );
         assert_eq!(betti([2, 2, 2], |_, _, _| false), Betti::from_chi(0, 0, 0));
     }
 }
