@@ -93,7 +93,7 @@ def read_gmsh(path, size):
             out["tets"] = len(tags)
             out["mesh_volume"] = float(sum(gmsh.model.mesh.getElementQualities(tags, "volume")))
             out["min_quality"] = float(quality[0])
-            out["inverted"] = sum(q <= 0 for q in quality)
+            out["inverted"] = int(sum(q <= 0 for q in quality))
         except Exception as e:  # gmsh raises plain Exception
             out["mesh_error"] = str(e)
     gmsh.finalize()
