@@ -11,24 +11,25 @@ use crate::medial::MedialAxis;
 use crate::monitor::Monitor;
 use crate::radii;
 use crate::remesh::Remeshed;
+use crate::report::Limits;
 use crate::skeleton::{self, QuadSkeleton, Skeleton, quad_skeleton};
 use crate::spline::{
     self, Brep, ControlMesh, G1Report, SplineError, Tessellation, build_brep, patches, tessellate,
 };
 use crate::thicken::{ThickenedBody, thicken};
 
-/// What to do when the fitted body cuts itself or a stage fails on a skeleton.
+/// When to try again with another quad size, and with which.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RetryOptions {
     /// Quad sizes to try in turn, as multiples of `skeleton.size_factor` (or `skeleton.quad_size`), until a body does
-    /// not cut itself. A skeleton drawn elsewhere is tried once.
+    /// not cut itself and follows the proposal within `report.limits`. A skeleton drawn elsewhere is tried once.
     pub quad_sizes: Vec<f64>,
 }
 
 impl Default for RetryOptions {
     fn default() -> Self {
-        Self { quad_sizes: vec![1.0, 0.8, 1.25] }
+        Self { quad_sizes: vec![1.0, 0.75, 0.55, 1.3] }
     }
 }
 
@@ -46,7 +47,7 @@ pub(super) struct Surface {
     pub(super) tessellation: Tessellation,
 }
 
-/// Skeleton, thickening and fit; the first body that does not cut itself wins, else the one that cuts itself least.
+/// Skeleton, thickening and fit; the first body that is sound and close enough wins, else the best of all tries.
 pub(super) fn shape(
     record: &mut Record,
     axis: &MedialAxis,
@@ -56,31 +57,71 @@ pub(super) fn shape(
     monitor: &Monitor,
 ) -> Result<Shape, PipelineError> {
     let sizes: &[f64] = if drawn.is_some() { &[1.0] } else { &options.retry.quad_sizes };
-    let mut best: Option<Shape> = None;
+    let mut best: Option<(Score, Shape)> = None;
     let mut failure = None;
     for (attempt, &size) in sizes.iter().enumerate() {
+        let name = format!("try {} (quad size x {size})", attempt + 1);
         match one_shape(record, axis, remeshed, drawn, size, options, monitor) {
             Ok(shape) => {
-                let places = shape.fitted.self_intersections.len();
-                if places == 0 {
+                let score = Score::of(&shape.fitted, remeshed.field.spacing, &options.report.limits);
+                if score.good() {
                     return Ok(shape);
                 }
-                monitor.warn("fit", format!("try {}: the body cuts itself at {places} places (quad size x {size})", attempt + 1));
-                if best.as_ref().is_none_or(|b| places < b.fitted.self_intersections.len()) {
-                    best = Some(shape);
+                monitor.warn("fit", format!("{name}: {score}"));
+                if best.as_ref().is_none_or(|(least, _)| score.worse() < least.worse()) {
+                    best = Some((score, shape));
                 }
             }
             Err(error) if error.is_cancelled() => return Err(error),
             Err(error) => {
-                monitor.warn(error.stage, format!("try {} (quad size x {size}) failed: {}", attempt + 1, error.source));
+                monitor.warn(error.stage, format!("{name} failed: {}", error.source));
                 failure = Some(error);
             }
         }
     }
     match (best, failure) {
-        (Some(shape), _) => Ok(shape),
+        (Some((_, shape)), _) => Ok(shape),
         (None, Some(error)) => Err(error),
         (None, None) => Err(PipelineError { stage: "skeleton", source: StageError::NoQuadSize }),
+    }
+}
+
+/// How good a fitted body is.
+struct Score {
+    /// Places where it cuts itself.
+    crossings: usize,
+    /// Distance and volume over their limits, the largest ratio; above 1 a limit is exceeded.
+    excess: f64,
+}
+
+/// The fit measures on its own samples; the final figures may be a little worse.
+const MARGIN: f64 = 0.95;
+
+impl Score {
+    fn of(fitted: &Fitted, voxel: f64, limits: &Limits) -> Self {
+        let both = [&fitted.body_to_iso, &fitted.iso_to_body];
+        let rms = both.iter().map(|d| d.rms).fold(0.0, f64::max) / (voxel * limits.distance_rms);
+        let p95 = both.iter().map(|d| d.p95).fold(0.0, f64::max) / (voxel * limits.distance_p95);
+        let volume = (fitted.volume / fitted.iso_volume - 1.0).abs() / limits.volume;
+        Self { crossings: fitted.self_intersections.len(), excess: rms.max(p95).max(volume) / MARGIN }
+    }
+
+    fn good(&self) -> bool {
+        self.crossings == 0 && self.excess <= 1.0
+    }
+
+    /// Orders tries: soundness first, then closeness.
+    fn worse(&self) -> (usize, f64) {
+        (self.crossings, self.excess)
+    }
+}
+
+impl std::fmt::Display for Score {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.crossings {
+            0 => write!(f, "the body misses the proposal by {:.2} times the limits for distance and volume", self.excess),
+            places => write!(f, "the body cuts itself at {places} places"),
+        }
     }
 }
 
