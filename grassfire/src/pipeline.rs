@@ -27,7 +27,7 @@ use crate::medial::{self, MedialOptions, PoleOptions};
 use crate::mesh::RepairOptions;
 use crate::monitor::Monitor;
 use crate::radii::RadiiOptions;
-use crate::remesh::RemeshOptions;
+use crate::remesh::{RemeshOptions, WrapOptions};
 use crate::report::{Report, ReportOptions};
 use crate::skeleton::SkeletonOptions;
 use crate::spline::{BrepOptions, PatchOptions, TessellateOptions};
@@ -64,6 +64,8 @@ pub struct ReconstructOptions {
     pub fit: FitOptions,
     /// What to do when a body cuts itself.
     pub retry: RetryOptions,
+    /// The body's last resort on bulky parts.
+    pub wrap: WrapOptions,
     /// G1 patches.
     pub patches: PatchOptions,
     /// Blocks and boundary representation.

@@ -10,13 +10,13 @@ use crate::fit::{Fitted, fit};
 use crate::medial::MedialAxis;
 use crate::monitor::Monitor;
 use crate::radii;
-use crate::remesh::Remeshed;
+use crate::remesh::{Remeshed, wrap};
 use crate::report::Limits;
 use crate::skeleton::{self, QuadSkeleton, Skeleton, quad_skeleton};
 use crate::spline::{
     self, Brep, ControlMesh, G1Report, SplineError, Tessellation, build_brep, patches, tessellate,
 };
-use crate::thicken::{ThickenedBody, thicken};
+use crate::thicken::{self, ThickenedBody, thicken};
 
 /// When to try again with another quad size, and with which.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -38,6 +38,8 @@ pub(super) struct Shape {
     pub(super) skeleton: QuadSkeleton,
     pub(super) body: ThickenedBody,
     pub(super) fitted: Fitted,
+    /// The body does not come from the skeleton but is wrapped around the proposal.
+    pub(super) wrapped: bool,
 }
 
 /// The smooth surface of the body.
@@ -79,11 +81,41 @@ pub(super) fn shape(
             }
         }
     }
+    if drawn.is_none() {
+        let wrapped = wrapped(record, axis, remeshed, options, monitor)?;
+        if let Some((score, shape)) = wrapped.filter(|(score, _)| {
+            best.as_ref().is_none_or(|(least, _)| score.worse() < least.worse())
+        }) {
+            monitor.warn("thicken", format!("the part is too bulky for its skeleton: its body of {} quads is wrapped around the proposal instead, and editing radii does not move it", shape.body.mesh.quads.len()));
+            if !score.good() {
+                monitor.warn("fit", format!("wrapped body: {score}"));
+            }
+            return Ok(shape);
+        }
+    }
     match (best, failure) {
         (Some((_, shape)), _) => Ok(shape),
         (None, Some(error)) => Err(error),
         (None, None) => Err(PipelineError { stage: "skeleton", source: StageError::NoQuadSize }),
     }
+}
+
+/// The last resort for bulky parts: a quad mesh wrapped around the proposal, fitted like a thickened one. The skeleton
+/// is still made and delivered; every point of the body belongs to its nearest skeleton point.
+fn wrapped(
+    record: &mut Record,
+    axis: &MedialAxis,
+    remeshed: &Remeshed,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Option<(Score, Shape)>, PipelineError> {
+    let skeleton = skeleton_of(record, axis, remeshed, None, 1.0, options, monitor)?;
+    let mesh = record.stage("thicken", || wrap(&remeshed.field, axis.solid, &options.wrap, monitor))?;
+    let Some(mesh) = mesh else { return Ok(None) };
+    let body = record.stage("thicken", || thicken::adopt(mesh, &skeleton.skeleton))?;
+    let fitted = record.stage("fit", || fit(&body, &skeleton.skeleton, &remeshed.field, &options.fit, monitor))?;
+    let score = Score::of(&fitted, remeshed.field.spacing, &options.report.limits);
+    Ok(Some((score, Shape { skeleton, body, fitted, wrapped: true })))
 }
 
 /// How good a fitted body is.
@@ -134,6 +166,22 @@ fn one_shape(
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Shape, PipelineError> {
+    let skeleton = skeleton_of(record, axis, remeshed, drawn, size, options, monitor)?;
+    let body = record.stage("thicken", || thicken(&skeleton.skeleton, &options.thicken, monitor))?;
+    let fitted = record.stage("fit", || fit(&body, &skeleton.skeleton, &remeshed.field, &options.fit, monitor))?;
+    Ok(Shape { skeleton, body, fitted, wrapped: false })
+}
+
+/// The quad skeleton at one quad size, or the one drawn elsewhere, with smooth radii.
+fn skeleton_of(
+    record: &mut Record,
+    axis: &MedialAxis,
+    remeshed: &Remeshed,
+    drawn: Option<&Skeleton>,
+    size: f64,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<QuadSkeleton, PipelineError> {
     let mut skeleton = record.stage("skeleton", || match drawn {
         Some(drawn) => Ok(adopt(drawn, axis)),
         None => {
@@ -145,9 +193,7 @@ fn one_shape(
     })?;
     radii::smooth(&mut skeleton.skeleton, options.radii.smoothing);
     skeleton.stats = skeleton::stats(&skeleton.skeleton);
-    let body = record.stage("thicken", || thicken(&skeleton.skeleton, &options.thicken, monitor))?;
-    let fitted = record.stage("fit", || fit(&body, &skeleton.skeleton, &remeshed.field, &options.fit, monitor))?;
-    Ok(Shape { skeleton, body, fitted })
+    Ok(skeleton)
 }
 
 /// Takes a skeleton drawn elsewhere; radii that it does not have come from the medial axis.

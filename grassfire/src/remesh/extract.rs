@@ -9,6 +9,7 @@ use super::digital::VoxelSet;
 use super::intersect::intersecting_vertices;
 use crate::Vec3;
 use crate::mesh::TriMesh;
+use crate::spline::ControlMesh;
 use crate::voxel::VoxelGrid;
 
 /// Pull of a vertex toward the mean of its cell's crossings, relative to one tangent plane.
@@ -175,6 +176,20 @@ pub(super) fn surface(grid: &VoxelGrid<f32>, set: &VoxelSet, repair: bool) -> Su
         mesh = triangulate(grid, &points, &polygons);
     }
     Surface { mesh, intersecting }
+}
+
+/// The same surface as quads; `None` where it needs other polygons.
+pub(super) fn quads(grid: &VoxelGrid<f32>, set: &VoxelSet) -> Option<ControlMesh> {
+    let mut cells = Cells {
+        grid,
+        set,
+        cases: cases(),
+        first: vec![u32::MAX; set.solid.len()],
+    };
+    let mut points: Vec<Vec3> = cells.number().iter().map(|v| v.mean).collect();
+    let polygons = cells.polygons(&mut points);
+    let quads = polygons.iter().map(|p| p[..].try_into().ok()).collect::<Option<Vec<[u32; 4]>>>()?;
+    Some(ControlMesh { points, quads })
 }
 
 impl Cells<'_> {

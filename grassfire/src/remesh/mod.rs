@@ -15,10 +15,12 @@ mod patch;
 mod resolution;
 mod signed_distance;
 mod smooth;
+mod wrap;
 
 pub use error::RemeshError;
 pub use options::{Capsule, RemeshOptions};
 pub use resolution::default_voxel;
+pub use wrap::{WrapOptions, wrap};
 
 use serde::Serialize;
 

@@ -1,5 +1,6 @@
 //! Thickening: skeleton with radii -> closed, oriented, manifold all-quad control mesh.
 
+mod adopt;
 mod beams;
 mod check;
 mod chords;
@@ -12,6 +13,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
 use crate::monitor::{Cancelled, Monitor};
+pub use adopt::adopt;
+
 use crate::skeleton::Skeleton;
 use crate::spline::ControlMesh;
 
