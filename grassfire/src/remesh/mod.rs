@@ -290,6 +290,12 @@ fn remesh_on(
     let (islands, lost) =
         islands::lost_islands(mesh, &field, width.max(2.0 * voxel), &noise.changes);
     noise.changes.extend(islands);
+    // What is left of a half-buried tunnel has been closed, and named, by the clean-up.
+    let again = |c: &TopologyChange, d: &TopologyChange| {
+        d.kind == c.kind && (d.place - c.place).norm() < 2.0 * voxel
+    };
+    let mut vanished = vanished;
+    vanished.retain(|c| !noise.changes.iter().any(|d| again(c, d)));
     noise.changes.extend(vanished);
     let skip = |v: usize, t: u32| {
         noise.touched[v] || lost[t as usize] || narrow.get(t as usize) == Some(&true)
