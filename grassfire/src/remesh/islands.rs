@@ -13,17 +13,7 @@ pub(super) fn lost_islands(
     limit: f64,
     known: &[TopologyChange],
 ) -> (Vec<TopologyChange>, Vec<bool>) {
-    let mut root: Vec<u32> = (0..mesh.points.len() as u32).collect();
-    for t in &mesh.triangles {
-        for k in 0..2 {
-            let (a, b) = (find(&mut root, t[k]), find(&mut root, t[k + 1]));
-            root[a.max(b) as usize] = a.min(b);
-        }
-    }
-    let mut pieces: Vec<Vec<u32>> = vec![Vec::new(); mesh.points.len()];
-    for (t, triangle) in mesh.triangles.iter().enumerate() {
-        pieces[find(&mut root, triangle[0]) as usize].push(t as u32);
-    }
+    let pieces = super::input::pieces(mesh);
     let mut lost = vec![false; mesh.triangles.len()];
     let mut changes = Vec::new();
     for piece in pieces.iter().filter(|p| p.len() >= 4) {
@@ -57,14 +47,6 @@ pub(super) fn lost_islands(
         }
     }
     (changes, lost)
-}
-
-fn find(root: &mut [u32], mut v: u32) -> u32 {
-    while root[v as usize] != v {
-        root[v as usize] = root[root[v as usize] as usize];
-        v = root[v as usize];
-    }
-    v
 }
 
 #[cfg(test)]

@@ -7,15 +7,18 @@ mod deviation;
 mod digital;
 mod error;
 mod extract;
+mod input;
 mod intersect;
 mod islands;
 mod noise;
 mod options;
 mod patch;
 mod resolution;
+mod sample;
 mod signed_distance;
 mod smooth;
 mod wrap;
+mod vanished;
 
 pub use error::RemeshError;
 pub use options::{Capsule, RemeshOptions};
@@ -25,17 +28,12 @@ pub use wrap::{WrapOptions, wrap};
 use serde::Serialize;
 
 use crate::Vec3;
-use crate::mesh::bvh::Bvh;
 use crate::mesh::{Solid, TriMesh};
 use crate::monitor::Monitor;
 use crate::voxel::VoxelGrid;
 use digital::VoxelSet;
 
 const STAGE: &str = "remesh";
-/// Longest edge of the triangles in the search tree, voxels.
-const PIECE: f64 = 4.0;
-/// Triangles in the search tree beyond which no more are split.
-const PIECES: usize = 2_000_000;
 
 /// What kind of topological noise was removed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -70,7 +68,7 @@ pub struct Remeshed {
     /// Signed distance, mm, positive inside, lightly smoothed, narrow band exact and clamped beyond. The voxel set
     /// `{field > 0}` under 6-connectivity (empty: 26) has the topology of `solid`; at least 3 empty voxels of margin.
     pub field: VoxelGrid<f32>,
-    /// Genus (sum over shells) before the clean-up.
+    /// Genus (sum over shells) of the input where that is a closed manifold, else of the voxel solid before the clean-up.
     pub genus_before: i64,
     /// Genus after it.
     pub genus_after: i64,
@@ -86,6 +84,8 @@ pub struct Remeshed {
 /// 2. Signed distance: exact near the surface, sign by the generalized winding number (> 1/2 is inside), propagated
 ///    beyond; a light Gaussian filter that keeps the volume.
 /// 3. Topological noise narrower than `options.min_tunnel` is removed by named changes; nothing else changes topology.
+///    A closed manifold that was not made on a lattice means what it shows: there only what sampling added is removed,
+///    narrowest first, and the voxel is made finer where tunnels get lost.
 /// 4. Dual contouring gives a closed manifold surface with exactly the topology of the voxel set.
 ///
 /// Several bodies are kept. Sharp edges come out rounded by about a third of a voxel, walls thinner than two voxels are
@@ -245,25 +245,19 @@ fn remesh_on(
     monitor: &Monitor,
 ) -> Result<Remeshed, RemeshError> {
     monitor.step(STAGE, "resolution", 0.0)?;
-    let bvh = Bvh::new(mesh);
-    let (lo, hi) = bvh.bounds().ok_or(RemeshError::Empty)?;
-    let voxel = options
-        .voxel
-        .unwrap_or_else(|| resolution::voxel_for(mesh, &bvh, options));
-    if (hi - lo).max() <= 0.0 || voxel <= 0.0 {
-        return Err(RemeshError::Empty);
-    }
-    let (origin, dims) = resolution::layout(&lo, &hi, voxel, options.max_voxels)?;
-    let fine = split_long_edges(mesh, PIECE * voxel);
-    let bvh = Bvh::new(&fine);
-    let mut field = signed_distance::signed_distance(mesh, &bvh, origin, voxel, dims, monitor)?;
-    if !field.values.iter().any(|&v| v > 0.0) {
-        return Err(not_solid(&bvh, &field));
-    }
-    monitor.step(STAGE, "smoothing", 0.55)?;
-    smooth::smooth(&mut field, options.smoothing);
+    let shells = input::shells(mesh);
+    // A mesh made on a lattice has the noise of that lattice; any other one means what it shows.
+    let trusted = shells.as_deref().filter(|_| source.is_none());
+    let sample::Sampled {
+        mut field,
+        bvh,
+        wanted,
+    } = sample::sampled(mesh, trusted, options, monitor)?;
+    let voxel = field.spacing;
     let width = options.min_tunnel * source.unwrap_or(voxel);
-    let mut noise = noise::remove_noise(&mut field, width, &options.keep_open, monitor)?;
+    let input_genus = shells.as_deref().map(input::genus);
+    let (vanished, narrow) = vanished(mesh, &field, input_genus, monitor);
+    let mut noise = noise::remove_noise(&mut field, width, wanted, &options.keep_open, monitor)?;
     let mut set = VoxelSet::positive(field.dims, &field.values);
     if !set.solid.contains(&true) {
         return Err(RemeshError::Vanished { voxel, width });
@@ -298,67 +292,53 @@ fn remesh_on(
     let (islands, lost) =
         islands::lost_islands(mesh, &field, width.max(2.0 * voxel), &noise.changes);
     noise.changes.extend(islands);
-    let skip = |v: usize, t: u32| noise.touched[v] || lost[t as usize];
+    // What is left of a half-buried tunnel has been closed, and named, by the clean-up.
+    let again = |c: &TopologyChange, d: &TopologyChange| {
+        d.kind == c.kind && (d.place - c.place).norm() < 2.0 * voxel
+    };
+    let mut vanished = vanished;
+    vanished.retain(|c| !noise.changes.iter().any(|d| again(c, d)));
+    noise.changes.extend(vanished);
+    let skip = |v: usize, t: u32| {
+        noise.touched[v] || lost[t as usize] || narrow.get(t as usize) == Some(&true)
+    };
     let distance_max = deviation::deviation(mesh, &bvh, &solid, &field, skip, options.samples);
     noise.changes.sort_by(|a, b| b.size.total_cmp(&a.size));
     Ok(Remeshed {
         solid,
         field,
-        genus_before: noise.before.b1,
+        genus_before: input_genus.unwrap_or(noise.before.b1),
         genus_after: after.b1,
         changes: noise.changes,
         distance_max,
     })
 }
 
-/// Halves the longest edge of every triangle until it is at most `length`: long triangles make poor boxes, and every
-/// query would visit most of them. Neighbours are split at the same points.
-fn split_long_edges(mesh: &TriMesh, length: f64) -> TriMesh {
-    let mut out = TriMesh {
-        points: mesh.points.clone(),
-        ..TriMesh::default()
-    };
-    let mut stack = mesh.triangles.clone();
-    stack.reverse();
-    while let Some(t) = stack.pop() {
-        let edge =
-            |k: usize| (out.points[t[k] as usize] - out.points[t[(k + 1) % 3] as usize]).norm();
-        let longest = (0..3)
-            .max_by(|&a, &b| edge(a).total_cmp(&edge(b)))
-            .unwrap_or(0);
-        if edge(longest) <= length || out.triangles.len() + stack.len() >= PIECES {
-            out.triangles.push(t);
-            continue;
-        }
-        let [a, b, c] = [t[longest], t[(longest + 1) % 3], t[(longest + 2) % 3]];
-        let middle = out.points.len() as u32;
-        out.points
-            .push((out.points[a as usize] + out.points[b as usize]) / 2.0);
-        stack.push([middle, b, c]);
-        stack.push([a, middle, c]);
+/// Tunnels of the input (of genus `input`) that `field` does not have, and a flag for each of their triangles; warns of
+/// them, and says how many could not be placed.
+fn vanished(
+    mesh: &TriMesh,
+    field: &VoxelGrid<f32>,
+    input: Option<i64>,
+    monitor: &Monitor,
+) -> (Vec<TopologyChange>, Vec<bool>) {
+    let have = VoxelSet::positive(field.dims, &field.values).betti().b1;
+    let lost = input.unwrap_or(have) - have;
+    if lost <= 0 {
+        return Default::default();
     }
-    out
-}
-
-/// The winding numbers say why nothing is inside.
-fn not_solid(bvh: &Bvh, field: &VoxelGrid<f32>) -> RemeshError {
-    let winding = crate::mesh::winding::Winding::new(bvh);
-    let step = (field.values.len() / 4000).max(1);
-    let places: Vec<Vec3> = (0..field.values.len())
-        .step_by(step)
-        .map(|v| {
-            let [i, j, k] = field.ijk(v);
-            field.centre(i, j, k)
-        })
-        .collect();
-    let all = winding.at_all(&places);
-    let lowest = all.iter().copied().fold(f64::INFINITY, f64::min);
-    let highest = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    RemeshError::NotSolid {
-        lowest,
-        highest,
-        sampled: places.len(),
+    let (changes, flags) = vanished::vanished_tunnels(mesh, field);
+    let unnamed = lost - changes.len() as i64;
+    let mut text = format!(
+        "{lost} of {} tunnels of the input are too narrow for the voxel of {:.3} mm and vanished in sampling",
+        input.unwrap_or(have),
+        field.spacing
+    );
+    if unnamed > 0 {
+        text += &format!("; {unnamed} of them could not be placed");
     }
+    monitor.warn(STAGE, text);
+    (changes, flags)
 }
 
 #[cfg(test)]

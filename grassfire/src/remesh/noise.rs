@@ -3,6 +3,7 @@
 use std::collections::{HashSet, VecDeque};
 
 use super::digital::{VoxelSet, delta_chi, is_simple};
+use super::input::Wanted;
 use super::options::Capsule;
 use super::patch::{Patch, Side, insert};
 use super::{ChangeKind, RemeshError, STAGE, TopologyChange, signed_distance};
@@ -39,17 +40,18 @@ pub(super) struct Outcome {
 ///    members, waists and webs are never cut.
 /// 4. Repeat until nothing changes.
 ///
+/// With `wanted`, only surplus tunnels and cavities are removed, narrowest first.
 /// Voxels inside the capsules of `keep_open` are never filled or cut.
 pub(super) fn remove_noise(
     grid: &mut VoxelGrid<f32>,
     width: f64,
+    wanted: Option<Wanted>,
     keep_open: &[Capsule],
     monitor: &Monitor,
 ) -> Result<Outcome, RemeshError> {
     let mut set = VoxelSet::positive(grid.dims, &grid.values);
-    let before = set.betti();
     let mut out = Outcome {
-        before,
+        before: set.betti(),
         changes: Vec::new(),
         touched: vec![false; grid.values.len()],
     };
@@ -60,13 +62,19 @@ pub(super) fn remove_noise(
     for round in 0..ROUNDS {
         monitor.step(STAGE, "topological noise", 0.6 + 0.05 * round as f64)?;
         let count = out.changes.len();
-        drop_small(grid, &mut set, width, &kept, &mut out);
+        drop_small(grid, &mut set, width, wanted, &kept, &mut out);
         if out.changes.len() > count {
             // Else the ghosts of the islands would be taken for gaps.
             refresh(grid, &set, &out.touched, monitor)?;
         }
-        close_tunnels(grid, &mut set, width, &kept, &mut out, monitor)?;
-        cut_bridges(grid, &mut set, width, &kept, &mut out, monitor)?;
+        let surplus = |set: &VoxelSet| match wanted {
+            Some(wanted) => set.betti().b1 - wanted.tunnels,
+            None => i64::MAX,
+        };
+        let most = surplus(&set);
+        close_tunnels(grid, &mut set, width, most, &kept, &mut out, monitor)?;
+        let most = surplus(&set);
+        cut_bridges(grid, &mut set, width, most, &kept, &mut out, monitor)?;
         if out.changes.len() == count {
             break;
         }
@@ -136,6 +144,7 @@ fn drop_small(
     grid: &mut VoxelGrid<f32>,
     set: &mut VoxelSet,
     width: f64,
+    wanted: Option<Wanted>,
     kept: &[bool],
     out: &mut Outcome,
 ) {
@@ -145,14 +154,21 @@ fn drop_small(
         (true, ChangeKind::IslandDropped),
         (false, ChangeKind::CavityFilled),
     ] {
-        let all = set.components(solid, (limit.powi(3)).min(1e7) as usize + 1);
+        let mut all = set.components(solid, (limit.powi(3)).min(1e7) as usize + 1);
+        let mut most = usize::MAX;
+        if let Some(wanted) = wanted.filter(|_| !solid) {
+            most = (all.len() - 1).saturating_sub(wanted.cavities.max(0) as usize);
+            all.sort_by_key(|c| c.size);
+        }
         for component in all {
             let small = component.extent() as f64 <= limit && !component.voxels.is_empty();
             // The first empty component is the outside; it holds the border voxels.
             let outside = component.voxels.iter().any(|&v| set.on_border(v));
-            if !small || outside || component.voxels.iter().any(|&v| is_kept(kept, v)) {
+            let held = component.voxels.iter().any(|&v| is_kept(kept, v));
+            if !small || outside || held || most == 0 {
                 continue;
             }
+            most -= 1;
             let mut sum = Vec3::zeros();
             for &v in &component.voxels {
                 let [i, j, k] = set.ijk(v);
@@ -191,13 +207,21 @@ fn close_tunnels(
     grid: &mut VoxelGrid<f32>,
     set: &mut VoxelSet,
     width: f64,
+    mut most: i64,
     kept: &[bool],
     out: &mut Outcome,
     monitor: &Monitor,
 ) -> Result<(), RemeshError> {
+    if most <= 0 {
+        return Ok(());
+    }
     let mut plugs = Vec::new();
     let six = set.neighbours_6();
-    for voxels in residue(grid, set, Side::Solid, width / 2.0, kept, monitor)? {
+    let mut found = residue(grid, set, Side::Solid, width / 2.0, kept, monitor)?;
+    if most < i64::MAX {
+        found.sort_by(|a, b| thickness(grid, a).total_cmp(&thickness(grid, b)));
+    }
+    for voxels in found {
         // A piece on its own raises the Euler number too, but closes nothing.
         if !voxels
             .iter()
@@ -206,7 +230,8 @@ fn close_tunnels(
             continue;
         }
         let gain = flip_all(set, &voxels, true);
-        if gain >= 1 {
+        if (1..=most).contains(&gain) {
+            most -= gain;
             plugs.push(Patch::new(grid, voxels));
         } else {
             flip_all(set, &voxels, false);
@@ -275,18 +300,28 @@ fn cut_bridges(
     grid: &mut VoxelGrid<f32>,
     set: &mut VoxelSet,
     width: f64,
+    mut most: i64,
     kept: &[bool],
     out: &mut Outcome,
     monitor: &Monitor,
 ) -> Result<(), RemeshError> {
+    if most <= 0 {
+        return Ok(());
+    }
     let mut cuts = Vec::new();
-    for voxels in residue(grid, set, Side::Empty, width / 2.0, kept, monitor)? {
+    let mut found = residue(grid, set, Side::Empty, width / 2.0, kept, monitor)?;
+    if most < i64::MAX {
+        found.sort_by(|a, b| thickness(grid, a).total_cmp(&thickness(grid, b)));
+    }
+    for voxels in found {
         let Some(length) = bridge_length(grid, set, &voxels, width) else {
             continue;
         };
         let pieces = set.components(true, 0).len();
         let gain = flip_all(set, &voxels, false);
-        if length <= width && gain >= 1 && set.components(true, 0).len() == pieces {
+        let fits = length <= width && (1..=most).contains(&gain);
+        if fits && set.components(true, 0).len() == pieces {
+            most -= gain;
             cuts.push(Patch {
                 reach: (length / 2.0).max(grid.spacing),
                 ..Patch::new(grid, voxels)
@@ -312,6 +347,12 @@ fn cut_bridges(
         &mut out.touched,
     );
     Ok(())
+}
+
+/// Width of the gap or member that a membrane spans, mm.
+fn thickness(grid: &VoxelGrid<f32>, voxels: &[u32]) -> f32 {
+    let depth = |v: &u32| grid.values[*v as usize].abs();
+    2.0 * voxels.iter().map(depth).fold(0.0, f32::max)
 }
 
 /// Makes all `voxels` solid or empty and returns the change of the Euler number.

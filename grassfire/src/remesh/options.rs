@@ -41,7 +41,8 @@ pub struct RemeshOptions {
     pub voxel: Option<f64>,
     /// Tunnels, cavities, bridges and islands narrower than this many voxels of the source grid are noise and are
     /// removed; 0 keeps everything. The source grid is the grid that a marching-cubes mesh or a density came from,
-    /// otherwise the remesh grid.
+    /// otherwise the remesh grid. A closed manifold mesh that was not made on a grid keeps all its tunnels and cavities:
+    /// there only what sampling added is removed, and pieces smaller than this.
     pub min_tunnel: f64,
     /// Places where the topology is never touched: the bores of non-design bodies.
     pub keep_open: Vec<Capsule>,

@@ -26,6 +26,8 @@ const LONGEST: [f64; 3] = [60.0, 200.0, 400.0];
 /// 2. The smaller of the mean edge and 1/6 of the 10th percentile, but no finer than 1/200 of the longest side of the
 ///    box unless walls of the 25th percentile would get fewer than 2.25 voxels, and then no finer than 1/400.
 /// 3. No coarser than 1/60 of the longest side; coarser again when `max_voxels` demands it.
+///
+/// The remesh of a closed manifold that was not made on a lattice goes finer when some of its tunnels get lost.
 pub fn default_voxel(mesh: &TriMesh, options: &RemeshOptions) -> f64 {
     voxel_for(mesh, &Bvh::new(mesh), options)
 }
@@ -92,6 +94,15 @@ fn voxel_count(lo: &Vec3, hi: &Vec3, voxel: f64) -> f64 {
         .iter()
         .map(|side| (side / voxel).ceil() + 2.0 * MARGIN as f64 + 1.0)
         .product()
+}
+
+/// `voxel` times `factor`, or the finest that the bounds allow.
+pub(super) fn finer(lo: &Vec3, hi: &Vec3, voxel: f64, factor: f64, max_voxels: usize) -> f64 {
+    let mut finer = (voxel * factor).max((hi - lo).max() / LONGEST[2]);
+    while finer < voxel && voxel_count(lo, hi, finer) > max_voxels as f64 {
+        finer *= 1.1;
+    }
+    finer
 }
 
 /// Origin and size of the grid, centred on the box so that a symmetric part gets a symmetric grid.

@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use super::closing::caps;
 use super::crossings::winding_by_rows;
-use super::{PIECE, RemeshError, STAGE, split_long_edges};
+use super::sample::{PIECE, split_long_edges};
+use super::{RemeshError, STAGE};
 use crate::Vec3;
 use crate::mesh::TriMesh;
 use crate::mesh::bvh::Bvh;
