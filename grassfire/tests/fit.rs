@@ -106,7 +106,8 @@ fn a_tangle_that_no_fit_can_cure_is_reported() {
     )
     .expect("fits");
     assert!(!fitted.self_intersections.is_empty());
-    assert_eq!(monitor.warnings().len(), fitted.self_intersections.len());
+    let troubles = fitted.self_intersections.len() + fitted.folds.len();
+    assert_eq!(monitor.warnings().len(), troubles);
     assert!(fitted.self_intersections[0].place.norm() < 12.0);
 }
 

@@ -3,6 +3,7 @@
 mod equations;
 mod round;
 mod surface;
+mod tangles;
 mod targets;
 mod untangle;
 
@@ -33,6 +34,12 @@ pub struct FitOptions {
     pub iso_samples: usize,
     /// Largest move of a control point in a round, voxels.
     pub max_step: f64,
+    /// Weight of tangential evenness of the net against the data. It spreads the control points over
+    /// the surface and hardly moves the surface itself.
+    pub evenness: f64,
+    /// Patches whose smallest normalised Jacobian is below this count as folded; untangling aims at
+    /// twice this.
+    pub fold_limit: f64,
     /// Largest number of unfolding rounds; 0 switches untangling off.
     pub untangle_rounds: u32,
     /// Rounds that give back what untangling took, without new intersections.
@@ -50,6 +57,8 @@ impl Default for FitOptions {
             fairness: 0.02,
             iso_samples: 20_000,
             max_step: 4.0,
+            evenness: 0.01,
+            fold_limit: 0.05,
             untangle_rounds: 12,
             regrow_rounds: 10,
             max_volume_loss: 0.01,
@@ -72,6 +81,8 @@ pub struct FitRound {
 pub struct UntangleRound {
     /// Intersecting triangle pairs of the limit mesh afterwards.
     pub pairs: u32,
+    /// Patches below twice the fold limit afterwards.
+    pub folds: u32,
     /// Rms distance of the limit surface to the iso-surface afterwards, mm.
     pub rms: f64,
     /// Volume afterwards, mm3.
@@ -87,6 +98,17 @@ pub struct SelfIntersectionPlace {
     pub place: Vec3,
     /// Control quads involved, ascending.
     pub quads: Vec<u32>,
+}
+
+/// A control quad whose G1 patch folds or nearly folds.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Fold {
+    /// Where the patch is worst, mm.
+    pub place: Vec3,
+    /// The control quad.
+    pub quad: u32,
+    /// Its smallest normalised Jacobian; negative where the normal flips over.
+    pub value: f64,
 }
 
 /// Distances over a sampled surface, mm.
@@ -114,6 +136,10 @@ pub struct Fitted {
     pub pairs_before_untangling: u32,
     /// What is left after untangling; empty when all is well.
     pub self_intersections: Vec<SelfIntersectionPlace>,
+    /// Folded patches before untangling.
+    pub folds_before_untangling: u32,
+    /// Patches that still fold after untangling, by quad; empty when all is well.
+    pub folds: Vec<Fold>,
     /// Limit surface to iso-surface (first-order distance |f| / |grad f|).
     pub body_to_iso: Distances,
     /// Iso-surface to limit surface (nearest triangle among those around the nearest sample).
@@ -190,12 +216,13 @@ impl FitError {
 ///    without which tips and corners are never reached. Weights: area, agreement of normals, and a
 ///    cap on far samples that tightens from round to round. Tangential damping and fairness
 ///    |Lap Lap X|^2 + 0.02 |Lap X|^2 keep the net regular; steps are clamped.
-/// 3. Untangling: where the limit mesh (two splits) intersects itself, fairness grows and data
-///    counts less until it does not; then rounds with all data give back what that took, their steps
-///    shortened wherever they would create an intersection. If places are left, or more volume or
+///    Tangential evenness |Lap X|^2, without its normal part, spreads the control points.
+/// 3. Untangling: where the limit mesh (two splits) intersects itself or a G1 patch folds, fairness
+///    grows and data counts less until it does not; then rounds with all data give back what that
+///    took, their steps shortened wherever they would create an intersection or deepen a fold. If places are left, or more volume or
 ///    accuracy is lost than the options allow, the same is tried from the thin start of the fit,
 ///    where little is in the way. Places that stay are reported in [`Fitted::self_intersections`]
-///    and as a warning, never hidden.
+///    and [`Fitted::folds`] and as warnings, never hidden.
 ///
 /// The normal equations are one sparse Cholesky system; its symbolic factorisation is made once.
 /// Memory and time grow nearly linearly with the quads. The result does not depend on the number of
@@ -248,6 +275,14 @@ fn report(fitted: &Fitted, monitor: &Monitor) {
         );
         monitor.warn(STAGE, text);
     }
+    for fold in &fitted.folds {
+        let (p, quad, value) = (fold.place, fold.quad, fold.value);
+        let text = format!(
+            "the fitted surface folds near ({:.1}, {:.1}, {:.1}) mm in control quad {quad}: normalised Jacobian {value:.3}",
+            p.x, p.y, p.z
+        );
+        monitor.warn(STAGE, text);
+    }
 }
 
 fn check_options(options: &FitOptions) -> Result<(), FitError> {
@@ -277,6 +312,8 @@ fn check_options(options: &FitOptions) -> Result<(), FitError> {
         200.0,
         "0 to 200",
     )?;
+    inside("evenness", options.evenness, 0.0, 100.0, "0 to 100")?;
+    inside("fold_limit", options.fold_limit, 0.0, 0.4, "0 to 0.4")?;
     inside("fairness", options.fairness, 1e-6, 1e3, "1e-6 to 1000")?;
     inside(
         "iso_samples",

@@ -66,6 +66,7 @@ impl<'a> Solver<'a> {
         self.equations.clear();
         let distance = self.add_data(&at, &normals, &areas, &schedule);
         self.add_fairness(points, mean_area, schedule.fairness);
+        self.add_evenness(&normals, mean_area);
         let solution = self
             .equations
             .solve()
@@ -161,6 +162,22 @@ impl<'a> Solver<'a> {
         for (p, place) in points.iter().enumerate() {
             self.equations.pin(p as u32, 1e-3 * mean_area, place);
         }
+    }
+
+    /// Tangential part of the Laplacian; the first samples are those of the control points.
+    fn add_evenness(&mut self, normals: &[Vec3], mean_area: f64) {
+        for r in 0..self.surface.coarse.point_count {
+            // Local fairness asks for a calmer net, too.
+            let weight = self.options.evenness * mean_area * self.fairness[r].min(20.0);
+            let block = weight * (Matrix3::identity() - normals[r] * normals[r].transpose());
+            let (indices, weights) = self.surface.laplacian.row(r);
+            self.equations.add(indices, weights, &block, &Vec3::zeros());
+        }
+    }
+
+    /// Patches below this normalised Jacobian fold.
+    pub fn fold_limit(&self) -> f64 {
+        self.options.fold_limit
     }
 
     /// Makes the net as straight as possible at the control points that are `near`; the others stay.

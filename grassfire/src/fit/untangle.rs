@@ -1,25 +1,23 @@
-//! Removal of self-intersections from the fitted limit surface, guarded.
-
-use std::collections::BTreeMap;
+//! Removal of self-intersections and folds from the fitted limit surface, guarded.
 
 use super::round::Solver;
-use super::{FitError, FitOptions, Fitted, STAGE, SelfIntersectionPlace, UntangleRound};
+use super::tangles::Tangles;
+use super::{FitError, FitOptions, Fitted, STAGE, UntangleRound};
 use crate::Vec3;
-use crate::mesh::TriMesh;
-use crate::mesh::self_intersection::self_intersections;
 use crate::monitor::Monitor;
 
 /// Step 3 of [`super::fit`].
 ///
-/// 1. Unfold: around the offending quads fairness grows and data counts less, until nothing
-///    intersects. This may thin necks, so it stops when much volume is gone.
+/// Offending quads are those that intersect others and those whose patch folds or nearly folds.
+/// 1. Unfold: around the offending quads fairness grows and data counts less, until there are none.
+///    This may thin necks, so it stops when much volume is gone.
 /// 2. Regrow: with all data back, rounds whose steps are shortened wherever they would create an
-///    intersection.
-/// 3. Guard: keep the result only if fewer places are left and volume and accuracy stayed within the
+///    intersection or deepen a fold.
+/// 3. Guard: keep the result only if less trouble is left and volume and accuracy stayed within the
 ///    limits.
-/// 4. If places are left: the same from the thin start of the fit, its own few intersections smoothed
+/// 4. If trouble is left: the same from the thin start of the fit, its own few intersections smoothed
 ///    away first. Slower, but nothing can fold on the way up.
-/// 5. What still intersects is reported.
+/// 5. What still intersects or folds is reported.
 pub(super) fn untangle(
     solver: &mut Solver,
     points: &mut Vec<Vec3>,
@@ -29,8 +27,10 @@ pub(super) fn untangle(
 ) -> Result<(), FitError> {
     let before = Tangles::of(solver, points);
     fitted.pairs_before_untangling = before.pairs.len() as u32;
-    if before.pairs.is_empty() || options.untangle_rounds == 0 {
+    fitted.folds_before_untangling = before.folds(solver, options.fold_limit).len() as u32;
+    if before.none() || options.untangle_rounds == 0 {
         fitted.self_intersections = before.places(solver);
+        fitted.folds = before.folds(solver, options.fold_limit);
         return Ok(());
     }
     let reference = state(solver, points, &before);
@@ -47,7 +47,8 @@ pub(super) fn untangle(
         let passes = now.rms <= reference.rms * (1.0 + options.max_rms_growth)
             && now.volume
                 >= reference.volume.min(fitted.iso_volume) * (1.0 - options.max_volume_loss)
-            && after.pairs.len() < left.pairs.len();
+            && after.pairs.len() <= left.pairs.len()
+            && after.trouble() < left.trouble();
         if passes {
             fitted
                 .untangle_rounds
@@ -62,11 +63,12 @@ pub(super) fn untangle(
             left = after;
             *points = trial;
         }
-        if left.pairs.is_empty() {
+        if left.none() {
             break;
         }
     }
     fitted.self_intersections = left.places(solver);
+    fitted.folds = left.folds(solver, options.fold_limit);
     Ok(())
 }
 
@@ -91,15 +93,15 @@ fn restart(
     let mut found = Tangles::of(solver, points);
     let mut best = (found.clone(), points.clone());
     for round in 0..12 {
-        if found.pairs.is_empty() {
+        if found.none() {
             break;
         }
         monitor.check()?;
-        let near = found.control_points(solver, 1 + round / 4);
+        let near = found.control_points(solver, &found.quads(), 1 + round / 4);
         *points = solver.smooth(points, &near)?;
         found = Tangles::of(solver, points);
         fitted.untangle_rounds.push(state(solver, points, &found));
-        if found.pairs.len() < best.0.pairs.len() {
+        if found.trouble() < best.0.trouble() {
             best = (found.clone(), points.clone());
         }
     }
@@ -110,6 +112,7 @@ fn restart(
 fn state(solver: &Solver, points: &[Vec3], tangles: &Tangles) -> UntangleRound {
     UntangleRound {
         pairs: tangles.pairs.len() as u32,
+        folds: tangles.folded.len() as u32,
         rms: solver.body_to_iso(points).rms,
         volume: solver.surface.volume(points),
         accepted: false,
@@ -127,7 +130,7 @@ fn unfold(
     let mut best = (found.clone(), points.clone());
     let volume = solver.surface.volume(points);
     for round in 0..options.untangle_rounds {
-        if found.pairs.is_empty() {
+        if found.none() {
             break;
         }
         monitor.step(
@@ -135,7 +138,7 @@ fn unfold(
             "untangling",
             0.65 + 0.15 * f64::from(round) / f64::from(options.untangle_rounds),
         )?;
-        let near = found.control_points(solver, 1);
+        let near = found.control_points(solver, &found.quads(), 1);
         for (factor, _) in solver
             .fairness
             .iter_mut()
@@ -159,7 +162,7 @@ fn unfold(
         found = Tangles::of(solver, points);
         let now = state(solver, points, &found);
         fitted.untangle_rounds.push(now);
-        if found.pairs.len() < best.0.pairs.len() {
+        if found.trouble() < best.0.trouble() {
             best = (found.clone(), points.clone());
         }
         if now.volume < 0.9 * volume {
@@ -206,19 +209,20 @@ fn regrow(
                 .map(|((p, w), s)| p + *s * (w - p))
                 .collect();
             last = Tangles::of(solver, &trial);
-            if last.pairs.len() <= found.pairs.len() {
+            let worse = last.worse_than(&found);
+            if worse.is_empty() {
                 accepted = Some(trial);
                 break;
             }
             let outer = 1 + attempt / 3;
             for (ring, factor) in [(0, 0.5), (outer, 0.7)] {
-                let near = last.control_points(solver, ring);
+                let near = last.control_points(solver, &worse, ring);
                 for (s, _) in share.iter_mut().zip(&near).filter(|(_, near)| **near) {
                     *s = if attempt > 4 { 0.0 } else { *s * factor };
                 }
             }
             if attempt == 1 {
-                let near = last.control_points(solver, 1);
+                let near = last.control_points(solver, &worse, 1);
                 for (f, _) in solver
                     .fairness
                     .iter_mut()
@@ -246,97 +250,4 @@ fn regrow(
         }
     }
     Ok(found)
-}
-
-/// Where the limit surface intersects itself.
-#[derive(Clone)]
-struct Tangles {
-    mesh: TriMesh,
-    pairs: Vec<[u32; 2]>,
-    /// Control quads involved, ascending.
-    quads: Vec<u32>,
-}
-
-impl Tangles {
-    fn of(solver: &Solver, points: &[Vec3]) -> Self {
-        let surface = solver.surface;
-        let mesh = surface.triangle_mesh(surface.samples.apply(points));
-        let pairs = self_intersections(&mesh);
-        let mut quads: Vec<u32> = pairs
-            .iter()
-            .flatten()
-            .map(|&t| surface.owner[t as usize])
-            .collect();
-        quads.sort_unstable();
-        quads.dedup();
-        Self { mesh, pairs, quads }
-    }
-
-    /// Control points of the offending quads and of `rings` rings of quads around.
-    fn control_points(&self, solver: &Solver, rings: u32) -> Vec<bool> {
-        let coarse = &solver.surface.coarse;
-        let mut near = vec![false; coarse.point_count];
-        for &q in &self.quads {
-            coarse.quads[q as usize]
-                .iter()
-                .for_each(|&v| near[v as usize] = true);
-        }
-        for _ in 0..rings {
-            let inner = near.clone();
-            for quad in &coarse.quads {
-                if quad.iter().any(|&v| inner[v as usize]) {
-                    quad.iter().for_each(|&v| near[v as usize] = true);
-                }
-            }
-        }
-        near
-    }
-
-    /// Groups offending quads that share points or intersect each other.
-    fn places(&self, solver: &Solver) -> Vec<SelfIntersectionPlace> {
-        let surface = solver.surface;
-        let mut parent: Vec<usize> = (0..surface.coarse.point_count).collect();
-        fn root(parent: &mut [usize], mut i: usize) -> usize {
-            while parent[i] != i {
-                parent[i] = parent[parent[i]];
-                i = parent[i];
-            }
-            i
-        }
-        let mut unite = |a: u32, b: u32| {
-            let (a, b) = (root(&mut parent, a as usize), root(&mut parent, b as usize));
-            parent[a.max(b)] = a.min(b);
-        };
-        let first = |q: u32| surface.coarse.quads[q as usize][0];
-        for &q in &self.quads {
-            surface.coarse.quads[q as usize]
-                .iter()
-                .for_each(|&v| unite(first(q), v));
-        }
-        for pair in &self.pairs {
-            let [a, b] = pair.map(|t| surface.owner[t as usize]);
-            unite(first(a), first(b));
-        }
-        let mut groups: BTreeMap<usize, (Vec<u32>, Vec3, f64)> = BTreeMap::new();
-        for &q in &self.quads {
-            groups
-                .entry(root(&mut parent, first(q) as usize))
-                .or_default()
-                .0
-                .push(q);
-        }
-        for &t in self.pairs.iter().flatten() {
-            let key = root(&mut parent, first(surface.owner[t as usize]) as usize);
-            let group = groups.entry(key).or_default();
-            group.1 += self.mesh.corners(t as usize).iter().sum::<Vec3>() / 3.0;
-            group.2 += 1.0;
-        }
-        groups
-            .into_values()
-            .map(|(quads, sum, count)| SelfIntersectionPlace {
-                place: surface.to_mm(&(sum / count.max(1.0))),
-                quads,
-            })
-            .collect()
-    }
 }
