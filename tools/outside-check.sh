@@ -10,11 +10,11 @@ skip() { echo "NOTICE: outside checks skipped: $*"; exit 0; }
 
 if [ ! -f "$folder/part.step" ]; then echo "outside checks: $folder/part.step is missing" >&2; exit 1; fi
 command -v python3 >/dev/null 2>&1 || skip "there is no python3"
-if ! "$venv/bin/python" -c 'import gmsh, numpy; from OCP.TopTools import TopTools_IndexedMapOfShape' >/dev/null 2>&1; then
+if ! "$venv/bin/python" -c 'import gmsh, numpy; from OCP.STEPControl import STEPControl_Reader' >/dev/null 2>&1; then
   rm -rf "$venv"
   python3 -m venv "$venv" >/dev/null 2>&1 || skip "python3 has no venv module (Debian: apt-get install python3-venv)"
   "$venv/bin/pip" install --quiet --disable-pip-version-check 'gmsh>=4.11,<5' 'cadquery-ocp>=7.7,<8' numpy >"$venv/pip.log" 2>&1 \
     || skip "pip could not install gmsh, cadquery-ocp and numpy ($(tail -n 1 "$venv/pip.log"))"
 fi
-problem=$("$venv/bin/python" -c 'import gmsh, numpy; from OCP.TopTools import TopTools_IndexedMapOfShape' 2>&1) || skip "$(tail -n 1 <<<"$problem")"
-"$venv/bin/python" tools/outside_check.py "$folder"
+problem=$("$venv/bin/python" -c 'import gmsh, numpy; from OCP.STEPControl import STEPControl_Reader' 2>&1) || skip "$(tail -n 1 <<<"$problem")"
+"$venv/bin/python" tools/verify_step.py "$folder"

@@ -21,6 +21,7 @@
 #include <BRepGProp.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRepTools.hxx>
+#include <BRepTopAdaptor_FClass2d.hxx>
 #include <BRep_Builder.hxx>
 #include <BRep_Tool.hxx>
 #include <Bnd_Box.hxx>
@@ -33,6 +34,7 @@
 #include <Message_Messenger.hxx>
 #include <Message_Printer.hxx>
 #include <Poly_Triangulation.hxx>
+#include <Precision.hxx>
 #include <ShapeAnalysis_ShapeTolerance.hxx>
 #include <Standard_Version.hxx>
 #include <TopExp.hxx>
@@ -294,6 +296,8 @@ rust::Vec<double> distances(const Shape& s, rust::Slice<const double> points) {
 }
 
 // Points inside the trimmed faces: the middles of triangles in parameter space, put back on the exact surface.
+// A triangle cuts across the hollow side of a curved edge, so its middle can lie outside the trimming: then the next one
+// is taken. A face without any middle inside (a sliver) keeps the first ones: the caller then sees too large a distance.
 rust::Vec<double> face_samples(const Shape& s, rust::Slice<const uint32_t> wanted, size_t per_face) {
   TopTools_IndexedMapOfShape map;
   TopExp::MapShapes(s.shape, TopAbs_FACE, map);
@@ -308,16 +312,28 @@ rust::Vec<double> face_samples(const Shape& s, rust::Slice<const uint32_t> wante
     }
     if (mesh.IsNull() || !mesh->HasUVNodes()) continue;
     const BRepAdaptor_Surface surface(face);
+    BRepTopAdaptor_FClass2d trimming(face, Precision::PConfusion());
     const size_t n = size_t(mesh->NbTriangles()), step = std::max<size_t>(1, n / std::max<size_t>(1, per_face));
-    for (size_t t = 0; t < n; t += step) {
+    const auto middle = [&](size_t t) {
       int a, b, c;
       mesh->Triangle(int(t) + 1).Get(a, b, c);
-      const gp_XY uv = (mesh->UVNode(a).XY() + mesh->UVNode(b).XY() + mesh->UVNode(c).XY()) / 3.;
+      return gp_Pnt2d((mesh->UVNode(a).XY() + mesh->UVNode(b).XY() + mesh->UVNode(c).XY()) / 3.);
+    };
+    const auto add = [&](const gp_Pnt2d& uv) {
       const gp_Pnt p = surface.Value(uv.X(), uv.Y());
       out.push_back(p.X());
       out.push_back(p.Y());
       out.push_back(p.Z());
-    }
+    };
+    const size_t before = out.size();
+    for (size_t first = 0; first < n; first += step)
+      for (size_t t = first; t < std::min(n, first + step); ++t)
+        if (trimming.Perform(middle(t)) == TopAbs_IN) {
+          add(middle(t));
+          break;
+        }
+    if (out.size() == before)
+      for (size_t t = 0; t < n; t += step) add(middle(t));
   }
   return out;
 }

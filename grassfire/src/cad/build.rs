@@ -1,13 +1,12 @@
 //! From the B-rep description and the non-design bodies to one checked solid.
 
-use std::time::Instant;
-
-use grassfire_occt::{BooleanResult, BrepDescription, OcctError, Operation, Origin, Shape};
+use grassfire_occt::{BrepDescription, OcctError, Operation, Shape};
 
 use super::bores::{self, Bore};
 use super::inspect::{self, NonDesignResult};
 use super::non_design::NonDesignBody;
-use super::reference::{self, Probe};
+use super::reference;
+use super::unite::{ATTEMPTS, Inputs};
 use super::{CadError, CadOptions, array, patches, shells, split};
 use crate::Vec3;
 use crate::monitor::Monitor;
@@ -59,15 +58,9 @@ pub struct CadSolid {
 
 const STAGE: &str = "cad";
 /// Accuracy of volumes; the kernel's own default is 1e-4 wrong on merged faces.
-const VOLUME_EPS: f64 = 1e-8;
+pub(super) const VOLUME_EPS: f64 = 1e-8;
 /// Limit for identities between volumes.
-const IDENTITY: f64 = 1e-6;
-/// Largest tolerance accepted in a part, mm.
-const MAX_TOLERANCE: f64 = 1e-2;
-/// Chord of the triangulation that is compared with the reference, mm, and its facet angle, radians.
-const CHECK_MESH: [f64; 2] = [0.01, 0.2];
-/// Largest accepted share of a body's region that is missing or too much in that triangulation.
-const REGION_TOLERANCE: f64 = 0.01;
+pub(super) const IDENTITY: f64 = 1e-6;
 
 /// Builds the part.
 ///
@@ -76,7 +69,7 @@ const REGION_TOLERANCE: f64 = 0.01;
 /// 2. Fuse all non-design bodies with their bores filled, then cut the bores: organic material never stays in a bore.
 /// 3. Check the union: no warnings, BRepCheck, closed, number of solids, inclusion-exclusion to 1e-6, and the volume,
 ///    the common part, the removed part and each body's region against ray integrals that use no boolean.
-/// 4. When a check fails: faces near the non-design bodies cut into single polynomials, then also a larger fuzzy value, a
+/// 4. When a check fails or a non-design body is not kept exactly: faces near the non-design bodies cut into single polynomials, then also a larger fuzzy value, a
 ///    small shift of the fitted body, one body at a time; at last the bodies side by side with `valid = false`.
 ///
 /// # Errors
@@ -110,7 +103,7 @@ pub fn build(
         } else {
             inspect::separate_sources(&sources, bodies)?
         };
-        return inspect::report(shape, sources, messages, sound, &context, monitor);
+        return inspect::report(shape, sources, None, messages, sound, &context, monitor);
     }
     let bodies_holes = free_bores(bodies)?;
     let tools: Vec<Option<Shape>> = bodies_holes
@@ -135,6 +128,7 @@ pub fn build(
     };
 
     let mut split_body = None;
+    let mut best: Option<CadSolid> = None;
     for attempt in ATTEMPTS {
         monitor.step(STAGE, attempt.text, 0.3)?;
         let body = match (&mut split_body, attempt.split) {
@@ -149,21 +143,48 @@ pub fn build(
         monitor.check()?;
         match outcome {
             Ok(united) => {
-                if !messages.is_empty() {
-                    messages.push(format!("passed: {}", attempt.text));
-                }
                 monitor.step(STAGE, "inspecting", 0.8)?;
                 let sources = inspect::sources(&united.mesh_shape, &united.kinds, &context)?;
-                return inspect::report(united.shape, sources, messages, true, &context, monitor);
+                let checked = Some(united.volume);
+                let mut solid = inspect::report(
+                    united.shape,
+                    sources,
+                    checked,
+                    Vec::new(),
+                    true,
+                    &context,
+                    monitor,
+                )?;
+                if !messages.is_empty() {
+                    solid
+                        .messages
+                        .insert(0, format!("passed: {}", attempt.text));
+                }
+                let kept = solid.non_design.iter().all(|body| body.kept);
+                if best.as_ref().is_none_or(|b| badness(&solid) < badness(b)) {
+                    best = Some(solid);
+                }
+                if kept {
+                    break;
+                }
+                messages.push(format!(
+                    "{}: a non-design body is not kept exactly",
+                    attempt.text
+                ));
             }
             Err(reason) => messages.push(format!("{} failed: {reason}", attempt.text)),
         }
+    }
+    if let Some(mut solid) = best {
+        solid.messages.splice(0..0, messages);
+        return Ok(solid);
     }
     messages.push("no union passed its checks; the fitted body and the non-design bodies are written side by side".into());
     let sources = inspect::separate_sources(&vec![FaceSource::Organic; brep.faces.len()], bodies)?;
     inspect::report(
         side_by_side(&body.shape, bodies)?,
         sources,
+        None,
         messages,
         false,
         &context,
@@ -171,12 +192,19 @@ pub fn build(
     )
 }
 
+/// How far a part is from keeping its non-design bodies: bodies not kept, then the largest distance, mm.
+fn badness(solid: &CadSolid) -> (usize, f64) {
+    let lost = solid.non_design.iter().filter(|body| !body.kept).count();
+    let distance = solid.non_design.iter().map(|body| body.max_distance);
+    (lost, distance.fold(0.0, f64::max))
+}
+
 /// The fitted body as solids.
-struct Body {
-    shape: Shape,
-    solids: u32,
-    volume: f64,
-    problems: Vec<String>,
+pub(super) struct Body {
+    pub(super) shape: Shape,
+    pub(super) solids: u32,
+    pub(super) volume: f64,
+    pub(super) problems: Vec<String>,
 }
 
 impl Body {
@@ -248,7 +276,7 @@ fn describe(brep: &Brep, solids: &[Vec<usize>]) -> BrepDescription {
 }
 
 /// A compound of one solid is that solid.
-fn single(shape: Shape) -> Result<Shape, OcctError> {
+pub(super) fn single(shape: Shape) -> Result<Shape, OcctError> {
     let mut solids = shape.solids()?;
     Ok(if solids.len() == 1 {
         solids.swap_remove(0)
@@ -314,107 +342,6 @@ fn disjoint<'a>(
     }
 }
 
-struct Inputs {
-    bosses: Option<Shape>,
-    tools: Option<Shape>,
-}
-
-/// What a face of a boolean's result is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
-    Organic,
-    Boss,
-    Bore,
-}
-
-pub(crate) struct United {
-    /// The part.
-    shape: Shape,
-    /// The same shape carrying a fine triangulation.
-    mesh_shape: Shape,
-    kinds: Vec<Kind>,
-}
-
-/// One way to make the union.
-#[derive(Debug, Clone, Copy)]
-struct Attempt {
-    text: &'static str,
-    /// Faces near the non-design bodies are single polynomials.
-    split: bool,
-    larger_fuzzy: bool,
-    shift: bool,
-    one_by_one: bool,
-}
-
-const PLAIN: Attempt = Attempt {
-    text: "union of all bodies",
-    split: false,
-    larger_fuzzy: false,
-    shift: false,
-    one_by_one: false,
-};
-const SPLIT: Attempt = Attempt {
-    text: "union with smaller faces near the non-design bodies",
-    split: true,
-    ..PLAIN
-};
-const ATTEMPTS: [Attempt; 5] = [
-    PLAIN,
-    SPLIT,
-    Attempt {
-        text: "union with smaller faces and a larger fuzzy value",
-        larger_fuzzy: true,
-        ..SPLIT
-    },
-    Attempt {
-        text: "union with smaller faces after a small shift of the fitted body",
-        shift: true,
-        ..SPLIT
-    },
-    Attempt {
-        text: "union with smaller faces, one body at a time",
-        one_by_one: true,
-        ..SPLIT
-    },
-];
-
-impl Attempt {
-    fn run(
-        self,
-        body: &Body,
-        inputs: &Inputs,
-        context: &inspect::Context,
-        monitor: &Monitor,
-    ) -> Result<United, String> {
-        let options = context.options;
-        let fuzzy = if self.larger_fuzzy {
-            options.fuzzy_retry
-        } else {
-            options.fuzzy
-        };
-        if let Some(problem) = body.problems.first() {
-            return Err(problem.clone());
-        }
-        if !self.shift {
-            return unite(body, inputs, fuzzy, self.one_by_one, context, monitor);
-        }
-        let by = Vec3::new(0.6, 0.48, 0.64) * options.shift;
-        let shape = body.shape.translated(array(by)).map_err(|e| e.0)?;
-        unite(
-            &Body {
-                shape,
-                problems: Vec::new(),
-                ..*body
-            },
-            inputs,
-            fuzzy,
-            self.one_by_one,
-            context,
-            monitor,
-        )
-    }
-}
-
 /// Faces whose control points come near a non-design body or its tools.
 fn near(
     brep: &Brep,
@@ -440,260 +367,4 @@ fn near(
             .any(|(a, b)| (0..3).all(|d| a[d] <= hi[d] && lo[d] <= b[d]))
     };
     Ok(brep.faces.iter().map(meets).collect())
-}
-
-/// Running result of the booleans.
-struct Progress<'a> {
-    shape: Shape,
-    kinds: Vec<Kind>,
-    common: f64,
-    fuzzy: f64,
-    interrupt: &'a (dyn Fn() -> bool + Sync),
-}
-
-impl Progress<'_> {
-    fn apply(&mut self, operation: Operation, tool: &Shape) -> Result<(), String> {
-        let kind = if operation == Operation::Cut {
-            Kind::Bore
-        } else {
-            Kind::Boss
-        };
-        let BooleanResult {
-            shape,
-            common,
-            warnings,
-            origins,
-        } = self
-            .shape
-            .boolean(operation, tool, self.fuzzy, true, self.interrupt)
-            .map_err(|e| e.0)?;
-        if let Some(first) = warnings.first() {
-            return Err(format!(
-                "the kernel warned: {first} ({} lines)",
-                warnings.len()
-            ));
-        }
-        if let Some(common) = common
-            && common.counts().map_err(|e| e.0)?.solids > 0
-        {
-            self.common += common.volume(VOLUME_EPS).map_err(|e| e.0)?;
-        }
-        let from = |origin: &Origin| match origin {
-            Origin::Object(face) => self.kinds.get(*face as usize).copied().unwrap_or(kind),
-            _ => kind,
-        };
-        self.kinds = origins.iter().map(from).collect();
-        self.shape = shape;
-        Ok(())
-    }
-}
-
-fn unite(
-    body: &Body,
-    inputs: &Inputs,
-    fuzzy: f64,
-    one_by_one: bool,
-    context: &inspect::Context,
-    monitor: &Monitor,
-) -> Result<United, String> {
-    let text = |e: OcctError| e.0;
-    let start = Instant::now();
-    let limit = context.options.boolean_seconds;
-    let interrupt = move || monitor.check().is_err() || start.elapsed().as_secs_f64() > limit;
-    let faces = body.shape.counts().map_err(text)?.faces as usize;
-    let mut at = Progress {
-        shape: body.shape.share().map_err(text)?,
-        kinds: vec![Kind::Organic; faces],
-        common: 0.0,
-        fuzzy,
-        interrupt: &interrupt,
-    };
-    let mut commons = [0.0; 2];
-    let mut bosses = 0.0;
-    for (k, (operation, tools)) in [
-        (Operation::Fuse, &inputs.bosses),
-        (Operation::Cut, &inputs.tools),
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        let Some(tools) = tools else { continue };
-        if operation == Operation::Fuse {
-            bosses = tools.volume(VOLUME_EPS).map_err(text)?;
-        }
-        at.common = 0.0;
-        if one_by_one {
-            tools
-                .solids()
-                .map_err(text)?
-                .iter()
-                .try_for_each(|tool| at.apply(operation, tool))?;
-        } else {
-            at.apply(operation, tools)?;
-        }
-        commons[k] = at.common;
-    }
-    let expected = body.volume + bosses - commons[0] - commons[1];
-    let shape = single(at.shape).map_err(text)?;
-    let volume = gates(&shape, body.solids, expected, context)?;
-    volumes(volume, commons, context)?;
-    let mesh_shape = shape.translated([0.0; 3]).map_err(text)?;
-    regions(&mesh_shape, context)?;
-    Ok(United {
-        shape,
-        mesh_shape,
-        kinds: at.kinds,
-    })
-}
-
-/// What the kernel can check by itself.
-fn gates(
-    shape: &Shape,
-    organic_solids: u32,
-    expected: f64,
-    context: &inspect::Context,
-) -> Result<f64, String> {
-    let text = |e: OcctError| e.0;
-    if let Some(fault) = shape.faults().map_err(text)? {
-        return Err(format!("the union is not valid: {fault}"));
-    }
-    let counts = shape.counts().map_err(text)?;
-    if counts.bad_edges > 0 {
-        return Err(format!(
-            "{} edges of the union have not exactly two faces",
-            counts.bad_edges
-        ));
-    }
-    let loose = context
-        .probes
-        .iter()
-        .filter(|p| p.overlap <= 1e-6 * p.region)
-        .count() as u32;
-    if counts.solids == 0 || counts.solids > organic_solids + loose {
-        return Err(format!(
-            "the union has {} solids; at most {} wanted",
-            counts.solids,
-            organic_solids + loose
-        ));
-    }
-    let tolerance = shape.max_tolerance().map_err(text)?;
-    if tolerance > MAX_TOLERANCE {
-        return Err(format!(
-            "the union's tolerance is {tolerance:.1e} mm; at most {MAX_TOLERANCE:.0e} wanted"
-        ));
-    }
-    let volume = shape.volume(VOLUME_EPS).map_err(text)?;
-    if ((volume - expected) / expected).abs() > IDENTITY {
-        return Err(format!(
-            "inclusion-exclusion gives {expected:.6} mm3, the union has {volume:.6} mm3"
-        ));
-    }
-    Ok(volume)
-}
-
-/// Volume, common part and removed part against the ray integrals.
-fn volumes(volume: f64, commons: [f64; 2], context: &inspect::Context) -> Result<(), String> {
-    let sum = |f: fn(&Probe) -> f64| context.probes.iter().map(f).sum::<f64>();
-    let allowed = context.options.volume_tolerance * sum(|p| p.region);
-    let rows = [
-        ("the union", volume, context.reference),
-        (
-            "the common part of fitted body and bosses",
-            commons[0],
-            sum(|p| p.overlap),
-        ),
-        ("what the bores removed", commons[1], sum(|p| p.removed)),
-    ];
-    match rows
-        .iter()
-        .find(|(_, got, wanted)| (got - wanted).abs() > allowed)
-    {
-        Some((what, got, wanted)) => Err(format!(
-            "{what} has {got:.3} mm3, independent rays give {wanted:.3} mm3; {allowed:.3} mm3 of difference allowed"
-        )),
-        None => Ok(()),
-    }
-}
-
-/// Every body's surroundings in the part's triangulation, ray by ray.
-fn regions(shape: &Shape, context: &inspect::Context) -> Result<(), String> {
-    let mesh = reference::triangles(shape, CHECK_MESH[0], CHECK_MESH[1]).map_err(|e| e.0)?;
-    for (probe, body) in context.probes.iter().zip(context.bodies) {
-        let (missing, extra) = probe.compare(&mesh);
-        if missing + extra > REGION_TOLERANCE * probe.region {
-            return Err(format!(
-                "around {} {missing:.3} mm3 are missing and {extra:.3} mm3 too much of {:.3} mm3",
-                body.name, probe.region
-            ));
-        }
-    }
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::cad::{NonDesignOptions, from_mesh};
-    use crate::mesh::TriMesh;
-
-    /// A square tube about z as a mesh: outside 10 x 10 x 8 mm, inside 6 x 6.
-    fn tube() -> TriMesh {
-        let mut mesh = TriMesh::default();
-        for corner in [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]] {
-            for (half, z) in [(5.0, 0.0), (5.0, 8.0), (3.0, 8.0), (3.0, 0.0)] {
-                mesh.points
-                    .push(Vec3::new(corner[0] * half, corner[1] * half, z));
-            }
-        }
-        for k in 0..4u32 {
-            for j in 0..4 {
-                let next = (k + 1) % 4;
-                let (a, b, c, d) = (
-                    4 * k + j,
-                    4 * next + j,
-                    4 * next + (j + 1) % 4,
-                    4 * k + (j + 1) % 4,
-                );
-                mesh.triangles.extend([[a, b, c], [a, c, d]]);
-            }
-        }
-        mesh
-    }
-
-    /// A solid that BRepCheck likes but from which a piece is missing, as silently wrong booleans make it.
-    #[test]
-    fn missing_piece_of_a_valid_solid_is_caught() -> Result<(), Box<dyn std::error::Error>> {
-        let monitor = Monitor::default();
-        let bodies = from_mesh(
-            "tube",
-            "test",
-            &tube(),
-            &NonDesignOptions::default(),
-            &monitor,
-        )?;
-        let options = CadOptions::default();
-        let probes = reference::probes(&Brep::default(), &bodies, &[None], options.rays, &monitor)?;
-        assert!(
-            (probes[0].part_volume - 512.0).abs() < 0.5,
-            "{}",
-            probes[0].part_volume
-        );
-        let context = inspect::Context {
-            bodies: &bodies,
-            options: &options,
-            probes: &probes,
-            reference: probes[0].part_volume,
-        };
-        let right = bodies[0].solid.share()?;
-        assert_eq!(volumes(512.0, [0.0; 2], &context), Ok(()));
-        assert_eq!(regions(&right, &context), Ok(()));
-        let piece = Shape::cuboid([3.5, -2.0, 1.0], [9.0, 1.0, 3.0])?;
-        let wrong = right
-            .boolean(Operation::Cut, &piece, 1e-5, false, &|| false)?
-            .shape;
-        assert!(gates(&wrong, 1, 512.0 - 9.0, &context).is_ok());
-        assert!(volumes(503.0, [0.0; 2], &context).is_err());
-        assert!(regions(&wrong, &context).is_err_and(|e| e.contains("tube")));
-        Ok(())
-    }
 }

@@ -4,9 +4,10 @@ use grassfire_occt::{OcctError, Shape, Surface};
 use serde::Serialize;
 
 use super::bores::Bore;
-use super::build::{CadSolid, FaceSource, Kind};
+use super::build::{CadSolid, FaceSource};
 use super::non_design::NonDesignBody;
 use super::reference::Probe;
+use super::unite::Kind;
 use super::{CadError, CadOptions, array};
 use crate::Vec3;
 use crate::monitor::Monitor;
@@ -133,21 +134,27 @@ pub(crate) fn separate_sources(
     Ok(out)
 }
 
-/// Measures the part and decides whether it is valid.
+/// Measures the part and decides whether it is valid. `checked` is the volume of a shape that BRepCheck has passed.
 pub(crate) fn report(
     shape: Shape,
     sources: Vec<FaceSource>,
+    checked: Option<f64>,
     mut messages: Vec<String>,
     mut valid: bool,
     context: &Context,
     monitor: &Monitor,
 ) -> Result<CadSolid, CadError> {
     let counts = shape.counts()?;
-    if let Some(text) = shape.faults()? {
-        valid = false;
-        messages.push(format!("BRepCheck: {text}"));
-    }
-    let volume = shape.volume(1e-8)?;
+    let volume = match checked {
+        Some(volume) => volume,
+        None => {
+            if let Some(text) = shape.faults()? {
+                valid = false;
+                messages.push(format!("BRepCheck: {text}"));
+            }
+            shape.volume(1e-8)?
+        }
+    };
     let euler = i64::from(counts.vertices) - i64::from(counts.edges) + 2 * i64::from(counts.faces)
         - i64::from(counts.wires);
     let (mut g1_max, mut shortest) = (0.0f64, f64::MAX);
@@ -192,7 +199,7 @@ pub(crate) fn report(
         bodies: counts.solids as usize,
         faces: counts.faces as usize,
         volume,
-        area: shape.area(1e-6)?,
+        area: faces.iter().map(|face| face.area).sum(),
         genus: i64::from(counts.shells) - euler / 2,
         g1_max,
         shortest_edge: if shortest == f64::MAX { 0.0 } else { shortest },

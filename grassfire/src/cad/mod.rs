@@ -33,6 +33,8 @@ mod reference;
 mod shells;
 #[cfg(feature = "occt")]
 mod split;
+#[cfg(feature = "occt")]
+mod unite;
 
 pub use error::CadError;
 pub use options::{CadOptions, NonDesignOptions, StepOptions};

@@ -40,13 +40,20 @@ impl Bodies {
     /// The region within `margin` mm of the bodies or in one of their bores.
     pub(super) fn region(&self, margin: f64) -> Region<'_> {
         let nearest = (!self.surface.triangles.is_empty()).then(|| Bvh::new(&self.surface));
-        Region { nearest, bores: &self.bores, margin }
+        Region {
+            nearest,
+            bores: &self.bores,
+            margin,
+        }
     }
 }
 
 impl Region<'_> {
     pub(super) fn contains(&self, p: &Vec3) -> bool {
-        let near = self.nearest.as_ref().is_some_and(|bvh| bvh.nearest(p, self.margin).is_some());
+        let near = self
+            .nearest
+            .as_ref()
+            .is_some_and(|bvh| bvh.nearest(p, self.margin).is_some());
         near || self.bores.iter().any(|bore| bore.contains(p))
     }
 }
@@ -60,7 +67,9 @@ pub(super) fn read(job: &ReconstructJob, monitor: &Monitor) -> Result<Bodies, St
         let solids = match io::read_input(path, &job.options.read, monitor)? {
             Input::Step(path) => cad::read(&path, options, monitor)?,
             Input::Mesh { mesh, .. } => {
-                let name = path.file_stem().map_or_else(|| "body".into(), |stem| stem.to_string_lossy());
+                let name = path
+                    .file_stem()
+                    .map_or_else(|| "body".into(), |stem| stem.to_string_lossy());
                 cad::from_mesh(&name, &path.display().to_string(), &mesh, options, monitor)?
             }
             Input::Density { .. } => return Err(StageError::DensityBody { path: path.clone() }),
@@ -68,10 +77,19 @@ pub(super) fn read(job: &ReconstructJob, monitor: &Monitor) -> Result<Bodies, St
         bodies.solids.extend(solids);
     }
     for body in &bodies.solids {
-        let surface = body.solid.tessellate(CHORD, FACET).map_err(cad::CadError::from)?;
+        let surface = body
+            .solid
+            .tessellate(CHORD, FACET)
+            .map_err(cad::CadError::from)?;
         let first = bodies.surface.points.len() as u32;
-        bodies.surface.points.extend(surface.points.iter().map(|p| Vec3::from(*p)));
-        bodies.surface.triangles.extend(surface.triangles.iter().map(|t| t.map(|v| v + first)));
+        bodies
+            .surface
+            .points
+            .extend(surface.points.iter().map(|p| Vec3::from(*p)));
+        bodies
+            .surface
+            .triangles
+            .extend(surface.triangles.iter().map(|t| t.map(|v| v + first)));
         bodies.bores.extend(body.bores.iter().map(kept_free));
     }
     Ok(bodies)
@@ -91,5 +109,9 @@ pub(super) fn read(job: &ReconstructJob, _monitor: &Monitor) -> Result<Bodies, S
 fn kept_free(bore: &cad::Bore) -> Capsule {
     let at = |t: f64| bore.origin + t * bore.direction;
     let [from, to] = bore.extent;
-    Capsule { a: at(from - bore.extension[0]), b: at(to + bore.extension[1]), radius: bore.radius }
+    Capsule {
+        a: at(from - bore.extension[0]),
+        b: at(to + bore.extension[1]),
+        radius: bore.radius,
+    }
 }

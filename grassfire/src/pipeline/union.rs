@@ -46,7 +46,12 @@ pub(super) fn part(
     }
     if intersections > 0 {
         solid.valid = false;
-        monitor.warn("cad", format!("the body cuts itself at {intersections} places, so the solid is not called valid"));
+        monitor.warn(
+            "cad",
+            format!(
+                "the body cuts itself at {intersections} places, so the solid is not called valid"
+            ),
+        );
     }
     let block = SolidBlock {
         valid: solid.valid,
@@ -61,9 +66,20 @@ pub(super) fn part(
         volume_check: solid.volume_check,
     };
     let triangles = cad::tessellate(&solid, CHORD * voxel)?;
-    let non_design_max = solid.non_design.iter().map(|body| body.max_distance).reduce(f64::max);
+    let non_design_max = solid
+        .non_design
+        .iter()
+        .map(|body| body.max_distance)
+        .reduce(f64::max);
     let non_design = solid.non_design.iter().map(entry).collect();
-    Ok(Part { mesh: triangles, volume: solid.volume, non_design_max, block: Some(block), non_design, solid })
+    Ok(Part {
+        mesh: triangles,
+        volume: solid.volume,
+        non_design_max,
+        block: Some(block),
+        non_design,
+        solid,
+    })
 }
 
 #[cfg(feature = "occt")]
@@ -81,7 +97,10 @@ fn entry(body: &NonDesignResult) -> NonDesignBlock {
 /// Writes `part.step` and `part.stl`.
 #[cfg(feature = "occt")]
 pub(super) fn deliver(part: &Part, product: &str, delivery: &Delivery) -> Result<(), StageError> {
-    let step = StepOptions { product: product.to_owned(), ..StepOptions::default() };
+    let step = StepOptions {
+        product: product.to_owned(),
+        ..StepOptions::default()
+    };
     cad::write_step(&part.solid, &delivery.path("part.step"), &step)?;
     Ok(delivery.stl("part.stl", &part.mesh)?)
 }
@@ -96,9 +115,21 @@ pub(super) fn part(
     _options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Part, StageError> {
-    monitor.warn("cad", "this build has no OpenCASCADE: body.obj, body.stl and part.stl are written, no STEP");
-    let mesh = TriMesh { tags: Vec::new(), ..surface.tessellation.mesh.clone() };
-    Ok(Part { mesh, volume: surface.brep.volume, non_design_max: None, block: None, non_design: Vec::new() })
+    monitor.warn(
+        "cad",
+        "this build has no OpenCASCADE: body.obj, body.stl and part.stl are written, no STEP",
+    );
+    let mesh = TriMesh {
+        tags: Vec::new(),
+        ..surface.tessellation.mesh.clone()
+    };
+    Ok(Part {
+        mesh,
+        volume: surface.brep.volume,
+        non_design_max: None,
+        block: None,
+        non_design: Vec::new(),
+    })
 }
 
 /// Writes `part.stl`.
