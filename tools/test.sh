@@ -1,5 +1,5 @@
 #!/bin/bash
-# Everything that must hold before a change is merged. Ends with the summary of the test runner.
+# Everything that must hold before a change is merged.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . tools/env.sh
@@ -24,8 +24,9 @@ cargo clippy --release --locked -p grassfire -p grassfire-cli --all-targets --no
 step documentation
 RUSTDOCFLAGS="-D warnings" cargo doc --release --locked --no-deps -p grassfire -p grassfire-cli --quiet
 
-step build without the CAD kernel
+step build and unit tests without the CAD kernel
 cargo build --release --locked -p grassfire-cli --no-default-features
+cargo test --release --locked -p grassfire --no-default-features --lib --quiet
 
 step demo
 cargo build --release --locked -p grassfire-cli
@@ -36,9 +37,11 @@ trap 'rm -rf "$demo"' EXIT
 step outside checks
 tools/outside-check.sh "$demo/wishbone"
 
+# Tests on real and on bad parts look for the corpus beside the repository or in GRASSFIRE_CORPUS, and say when it is not there.
 step tests
 if cargo nextest --version >/dev/null 2>&1; then
   cargo nextest run --release --locked --workspace --no-fail-fast
 else
   cargo test --release --locked --workspace --no-fail-fast
 fi
+step done
