@@ -37,10 +37,16 @@ fn plate_becomes_a_good_part() {
     let off = number(&printed, "/input/volume") / volume - 1.0;
     assert!(off.abs() < 1e-6, "{off}");
     assert_eq!(printed["remesh"]["genus_after"], 1);
-    assert_eq!(printed["topology"]["solid"], printed["topology"]["skeleton"]);
+    assert_eq!(
+        printed["topology"]["solid"],
+        printed["topology"]["skeleton"]
+    );
     if cfg!(feature = "occt") {
         let solid = &printed["solid"];
-        assert_eq!((&solid["valid"], solid["genus"].as_i64()), (&Value::Bool(true), Some(1)));
+        assert_eq!(
+            (&solid["valid"], solid["genus"].as_i64()),
+            (&Value::Bool(true), Some(1))
+        );
     }
     let listed = printed["files"].as_array().expect("files");
     for file in listed {
@@ -55,18 +61,29 @@ fn skeleton_comes_back_as_ply_and_as_obj() {
     let first = run(folder.path(), &[]);
     let (quads, topology) = {
         let report = first.report();
-        (report["skeleton"]["quads"].clone(), report["topology"]["skeleton"].clone())
+        (
+            report["skeleton"]["quads"].clone(),
+            report["topology"]["skeleton"].clone(),
+        )
     };
     let ply = folder.path().join("mine.ply");
     std::fs::write(&ply, first.file("skeleton.ply")).expect("writes");
     let obj = folder.path().join("mine.obj");
     std::fs::write(&obj, obj_of(&first.file("skeleton.ply"))).expect("writes");
     for skeleton in [ply, obj] {
-        let again = run(folder.path(), &["--skeleton", &skeleton.display().to_string()]);
+        let again = run(
+            folder.path(),
+            &["--skeleton", &skeleton.display().to_string()],
+        );
         assert!(matches!(again.code, Some(0 | 1)), "{}", again.stderr);
         let report = again.report();
         assert_eq!(report["skeleton"]["quads"], quads, "{}", skeleton.display());
-        assert_eq!(report["topology"]["skeleton"], topology, "{}", skeleton.display());
+        assert_eq!(
+            report["topology"]["skeleton"],
+            topology,
+            "{}",
+            skeleton.display()
+        );
         assert!(number(&report, "/volume/relative_difference").abs() < 0.02);
         if cfg!(feature = "occt") {
             assert_eq!(report["solid"]["valid"], true);
@@ -81,17 +98,26 @@ fn obj_of(ply: &[u8]) -> String {
     assert!(header.contains("format ascii"), "{header}");
     let count = |name: &str| {
         let line = header.lines().find_map(|line| line.strip_prefix(name));
-        line.and_then(|n| n.trim().parse::<usize>().ok()).unwrap_or(0)
+        line.and_then(|n| n.trim().parse::<usize>().ok())
+            .unwrap_or(0)
     };
-    let lines: Vec<Vec<&str>> = body.lines().map(|line| line.split_whitespace().collect()).collect();
+    let lines: Vec<Vec<&str>> = body
+        .lines()
+        .map(|line| line.split_whitespace().collect())
+        .collect();
     let (points, faces) = (count("element vertex "), count("element face "));
     let mut obj = String::new();
     for point in &lines[..points] {
         obj += &format!("v {}\n", point[..3].join(" "));
     }
     for face in &lines[points..points + faces] {
-        let corners = face[1..5].iter().map(|v| v.parse::<usize>().expect("an index") + 1);
-        obj += &format!("f {}\n", corners.map(|v| v.to_string()).collect::<Vec<_>>().join(" "));
+        let corners = face[1..5]
+            .iter()
+            .map(|v| v.parse::<usize>().expect("an index") + 1);
+        obj += &format!(
+            "f {}\n",
+            corners.map(|v| v.to_string()).collect::<Vec<_>>().join(" ")
+        );
     }
     obj
 }
@@ -101,7 +127,12 @@ fn a_stage_that_fails_ends_with_3() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = run(folder.path(), &["--set", "retry.quad_sizes=[]"]);
     assert_eq!(run.code, Some(3), "{}", run.stderr);
-    assert_eq!((run.lines("error: ").len(), run.lines("hint: ").len()), (1, 1), "{}", run.stderr);
+    assert_eq!(
+        (run.lines("error: ").len(), run.lines("hint: ").len()),
+        (1, 1),
+        "{}",
+        run.stderr
+    );
     assert!(!run.output.join("part.step").exists() && !run.output.join("report.json").exists());
 }
 
@@ -110,7 +141,11 @@ fn a_missed_check_ends_with_1_and_everything_is_written() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = run(folder.path(), &["--set", "report.limits.distance_rms=0"]);
     assert_eq!(run.code, Some(1), "{}", run.stderr);
-    assert!(run.stdout.contains("not met") && run.stdout.contains("distance.rms"), "{}", run.stdout);
+    assert!(
+        run.stdout.contains("not met") && run.stdout.contains("distance.rms"),
+        "{}",
+        run.stdout
+    );
     assert!(run.output.join("report.html").is_file() && run.output.join("body.obj").is_file());
 }
 
@@ -125,7 +160,9 @@ fn ctrl_c_ends_with_130_and_leaves_no_half_written_file() {
     while !output.join("proposal.stl").exists() && begin.elapsed() < Duration::from_secs(300) {
         std::thread::sleep(Duration::from_millis(5));
     }
-    let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    let kill = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
     assert!(kill.expect("kill runs").success());
     let run = finish(child, &output);
     assert_eq!(run.code, Some(130), "{}", run.stderr);
@@ -134,8 +171,19 @@ fn ctrl_c_ends_with_130_and_leaves_no_half_written_file() {
         .expect("the folder is there")
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .collect();
-    let whole = ["proposal.stl", "poles.ply", "thickness.ply", "medial.ma", "skeleton.ply", "body.obj", "body.stl"];
-    assert!(names.iter().all(|name| whole.contains(&name.as_str())), "{names:?}");
+    let whole = [
+        "proposal.stl",
+        "poles.ply",
+        "thickness.ply",
+        "medial.ma",
+        "skeleton.ply",
+        "body.obj",
+        "body.stl",
+    ];
+    assert!(
+        names.iter().all(|name| whole.contains(&name.as_str())),
+        "{names:?}"
+    );
     let proposal = run.file("proposal.stl");
     let triangles = u32::from_le_bytes([proposal[80], proposal[81], proposal[82], proposal[83]]);
     assert_eq!(proposal.len(), 84 + 50 * triangles as usize);

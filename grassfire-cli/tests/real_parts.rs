@@ -37,12 +37,21 @@ fn must_be_good(run: &Run) -> Value {
     assert_eq!(topology["solid"], topology["skeleton"]);
     let body = topology["body"].as_array().expect("surfaces of the body");
     let chi: i64 = body.iter().filter_map(|shell| shell["chi"].as_i64()).sum();
-    assert_eq!(Some(chi), topology["skeleton"]["chi"].as_i64().map(|chi| 2 * chi));
+    assert_eq!(
+        Some(chi),
+        topology["skeleton"]["chi"].as_i64().map(|chi| 2 * chi)
+    );
     for shell in body {
-        assert_eq!((&shell["closed"], &shell["manifold"]), (&Value::Bool(true), &Value::Bool(true)));
+        assert_eq!(
+            (&shell["closed"], &shell["manifold"]),
+            (&Value::Bool(true), &Value::Bool(true))
+        );
     }
     let solid = &report["solid"];
-    assert_eq!((&solid["valid"], solid["bodies"].as_u64()), (&Value::Bool(true), Some(1)));
+    assert_eq!(
+        (&solid["valid"], solid["bodies"].as_u64()),
+        (&Value::Bool(true), Some(1))
+    );
     assert_eq!(solid["genus"], report["remesh"]["genus_after"]);
     let voxel = number(&report, "/distance/voxel");
     let at_most = |pointer: &str, limit: f64| {
@@ -60,7 +69,9 @@ fn must_be_good(run: &Run) -> Value {
 
 /// A part whose tunnels are all real: the solid has the genus of the file.
 fn bracket(name: &str, genus: i64) {
-    let Some((_folder, run)) = run(name, &[]) else { return };
+    let Some((_folder, run)) = run(name, &[]) else {
+        return;
+    };
     let report = must_be_good(&run);
     assert_eq!(report["solid"]["genus"].as_i64(), Some(genus));
 }
@@ -87,7 +98,9 @@ fn simjeb_623_becomes_a_good_solid() {
 
 #[test]
 fn strap_becomes_a_good_solid_and_every_closed_tunnel_is_named() {
-    let Some((_folder, run)) = run("abc_00000125_strap.obj", &[]) else { return };
+    let Some((_folder, run)) = run("abc_00000125_strap.obj", &[]) else {
+        return;
+    };
     let report = must_be_good(&run);
     let closed = report["remesh"]["changes"].as_array().map_or(0, Vec::len);
     assert_eq!(report["solid"]["genus"].as_i64(), Some(3 - closed as i64));
@@ -98,7 +111,9 @@ fn rings_stay_in_the_bracket_as_given() {
     let Some(corpus) = corpus() else { return };
     let rings = corpus.join("dev/ge_solid_domain.stl");
     let rings = rings.display().to_string();
-    let Some((_folder, run)) = run("simjeb_398.obj", &["--non-design", &rings]) else { return };
+    let Some((_folder, run)) = run("simjeb_398.obj", &["--non-design", &rings]) else {
+        return;
+    };
     let report = must_be_good(&run);
     let bodies = report["non_design"].as_array().expect("non-design bodies");
     assert_eq!(bodies.len(), 6);
@@ -128,12 +143,19 @@ fn cylinder_radii(step: &str) -> Vec<f64> {
 #[test]
 fn one_and_two_threads_write_the_same_bytes() {
     let name = "simjeb_576.obj";
-    let (Some((_one, one)), Some((_two, two))) =
-        (run(name, &["--threads", "1"]), run(name, &["--threads", "2"]))
-    else {
+    let (Some((_one, one)), Some((_two, two))) = (
+        run(name, &["--threads", "1"]),
+        run(name, &["--threads", "2"]),
+    ) else {
         return;
     };
-    for file in ["skeleton.ply", "body.obj", "part.step", "medial.ma", "proposal.stl"] {
+    for file in [
+        "skeleton.ply",
+        "body.obj",
+        "part.step",
+        "medial.ma",
+        "proposal.stl",
+    ] {
         let same = without_time(&one.file(file)) == without_time(&two.file(file));
         assert!(same, "{file} depends on the number of threads");
     }

@@ -1,6 +1,9 @@
 //! Runs the program with a hang guard and gives its report back.
 
-#![allow(dead_code, reason = "each test program uses its own part of this module")]
+#![allow(
+    dead_code,
+    reason = "each test program uses its own part of this module"
+)]
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -144,8 +147,7 @@ pub fn plate_with_hole(side: f64, hole: f64, thick: f64) -> Vec<u8> {
             let [x, y] = ring(n, outer);
             [x, y, z]
         };
-        let corners =
-            |outer: bool, z: f64| (at(k, outer, z), at(k + 1, outer, z));
+        let corners = |outer: bool, z: f64| (at(k, outer, z), at(k + 1, outer, z));
         let ((i0, i1), (o0, o1)) = (corners(false, 0.0), corners(true, 0.0));
         let ((ti0, ti1), (to0, to1)) = (corners(false, thick), corners(true, thick));
         quad(ti0, to0, to1, ti1);
