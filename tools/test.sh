@@ -15,7 +15,8 @@ if [ ${#missing[@]} -gt 0 ]; then rustup component add "${missing[@]}"; fi
 step format
 cargo fmt --all --check
 
-# One profile and one target folder for all steps, so that dependencies are compiled once.
+# One profile, one target folder and the same set of crates for all steps: cargo then compiles dependencies once for
+# checking and once for running.
 step lints
 cargo clippy --release --locked --workspace --all-targets -- -D warnings
 step lints without the CAD kernel
@@ -24,12 +25,14 @@ cargo clippy --release --locked -p grassfire -p grassfire-cli --all-targets --no
 step documentation
 RUSTDOCFLAGS="-D warnings" cargo doc --release --locked --no-deps -p grassfire -p grassfire-cli --quiet
 
-step build and unit tests without the CAD kernel
-cargo build --release --locked -p grassfire-cli --no-default-features
-cargo test --release --locked -p grassfire --no-default-features --lib --quiet
+step unit tests without the CAD kernel
+cargo test --release --locked -p grassfire -p grassfire-cli --no-default-features --lib --bins --quiet
+
+# Builds the program too.
+step build
+cargo test --release --locked --workspace --no-run
 
 step demo
-cargo build --release --locked -p grassfire-cli
 demo=$(mktemp -d)
 trap 'rm -rf "$demo"' EXIT
 "$target/release/grassfire" demo wishbone -o "$demo/wishbone" -q || [ $? -eq 1 ]
@@ -37,7 +40,8 @@ trap 'rm -rf "$demo"' EXIT
 step outside checks
 tools/outside-check.sh "$demo/wishbone"
 
-# Tests on real and on bad parts look for the corpus beside the repository or in GRASSFIRE_CORPUS, and say when it is not there.
+# Tests on real and on bad parts look for the corpus beside the repository or in GRASSFIRE_CORPUS, and say so when it
+# is not there.
 step tests
 if cargo nextest --version >/dev/null 2>&1; then
   cargo nextest run --release --locked --workspace --no-fail-fast

@@ -19,12 +19,9 @@ const VOLUME: f64 = 0.02;
 /// Runs at a time.
 const AT_ONCE: usize = 2;
 
-/// A coarse voxel for variants of one part, which would cost minutes in sum; the default is taken on the other files.
+/// The default voxel everywhere but on the bulky plate.
 fn arguments(name: &str) -> &'static [&'static str] {
     match &name[..2] {
-        "02" | "03" | "04" | "05" | "06" | "10" | "11" | "12" | "14" | "15" | "19" | "20" => {
-            &["--voxel", "2"]
-        }
         // The plate is in inches.
         "07" | "23" | "24" | "25" => &["--voxel", "0.06"],
         // 17 nanometres long: below what a CAD kernel tells apart, and the repair's warning says to check the unit.
