@@ -32,12 +32,13 @@ demo: build ## reconstruct the wishbone: STEP and report in out/wishbone
 	fi
 	exit $$code
 
-test: setup ## format, lints, all tests, checks of the demo's STEP by other programs
+test: setup ## format, lints, all tests (with the corpus where it is), checks of the demo's STEP by other programs
 	@tools/test.sh
 
-bench: setup ## speed against peers and bounds
+bench: setup ## speed of the medial stage beside CGAL (installs libcgal-dev), and of the faces
 	@. tools/env.sh
-	$(CARGO) bench --locked -p grassfire
+	grassfire/benches/cgal/run.sh
+	$(CARGO) bench --locked -p grassfire --no-default-features --bench spline
 
 corpus: build ## the real and the bad parts of $(CORPUS)
 	@. tools/env.sh

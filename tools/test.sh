@@ -1,5 +1,5 @@
 #!/bin/bash
-# Everything that must hold before a change is merged. Ends with the summary of the test runner.
+# Everything that must hold before a change is merged.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . tools/env.sh
@@ -15,7 +15,8 @@ if [ ${#missing[@]} -gt 0 ]; then rustup component add "${missing[@]}"; fi
 step format
 cargo fmt --all --check
 
-# One profile and one target folder for all steps, so that dependencies are compiled once.
+# One profile, one target folder and the same set of crates for all steps: cargo then compiles dependencies once for
+# checking and once for running.
 step lints
 cargo clippy --release --locked --workspace --all-targets -- -D warnings
 step lints without the CAD kernel
@@ -24,11 +25,14 @@ cargo clippy --release --locked -p grassfire -p grassfire-cli --all-targets --no
 step documentation
 RUSTDOCFLAGS="-D warnings" cargo doc --release --locked --no-deps -p grassfire -p grassfire-cli --quiet
 
-step build without the CAD kernel
-cargo build --release --locked -p grassfire-cli --no-default-features
+step unit tests without the CAD kernel
+cargo test --release --locked -p grassfire -p grassfire-cli --no-default-features --lib --bins --quiet
+
+# Builds the program too.
+step build
+cargo test --release --locked --workspace --no-run
 
 step demo
-cargo build --release --locked -p grassfire-cli
 demo=$(mktemp -d)
 trap 'rm -rf "$demo"' EXIT
 "$target/release/grassfire" demo wishbone -o "$demo/wishbone" -q || [ $? -eq 1 ]
@@ -36,9 +40,12 @@ trap 'rm -rf "$demo"' EXIT
 step outside checks
 tools/outside-check.sh "$demo/wishbone"
 
+# Tests on real and on bad parts look for the corpus beside the repository or in GRASSFIRE_CORPUS, and say so when it
+# is not there.
 step tests
 if cargo nextest --version >/dev/null 2>&1; then
   cargo nextest run --release --locked --workspace --no-fail-fast
 else
   cargo test --release --locked --workspace --no-fail-fast
 fi
+step done

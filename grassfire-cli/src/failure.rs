@@ -20,7 +20,11 @@ pub struct Failure {
 impl Failure {
     /// Bad input or usage.
     pub fn usage(message: impl Into<String>, hint: Option<String>) -> Self {
-        Self { message: message.into(), hint, code: 2 }
+        Self {
+            message: message.into(),
+            hint,
+            code: 2,
+        }
     }
 
     /// Prints both lines on stderr.
@@ -34,7 +38,11 @@ impl Failure {
 
 impl From<PipelineError> for Failure {
     fn from(error: PipelineError) -> Self {
-        Self { message: chain(&error), hint: error.hint(), code: error.exit_code() }
+        Self {
+            message: chain(&error),
+            hint: error.hint(),
+            code: error.exit_code(),
+        }
     }
 }
 
@@ -67,7 +75,10 @@ pub fn from_clap(error: &clap::Error) -> Failure {
     let text = error.render().to_string();
     let body = text.strip_prefix("error: ").unwrap_or(&text);
     let message = body.split("\n\n").next().unwrap_or(body);
-    let line = |start: &str| text.lines().find_map(|line| line.trim().strip_prefix(start).map(str::to_owned));
+    let line = |start: &str| {
+        text.lines()
+            .find_map(|line| line.trim().strip_prefix(start).map(str::to_owned))
+    };
     let hint = line("tip: ")
         .or_else(|| line("Usage: ").map(|usage| format!("usage: {usage}")))
         .unwrap_or_else(|| "`grassfire --help` shows the usage".to_owned());
@@ -82,9 +93,17 @@ mod tests {
 
     #[test]
     fn chain_names_every_cause_once() {
-        let source = StageError::StepProposal { path: "part.step".into() };
-        let failure = Failure::from(PipelineError { stage: "read", source });
-        assert_eq!(failure.message, "read: part.step is a STEP file; the proposal must be a mesh or a density");
+        let source = StageError::StepProposal {
+            path: "part.step".into(),
+        };
+        let failure = Failure::from(PipelineError {
+            stage: "read",
+            source,
+        });
+        assert_eq!(
+            failure.message,
+            "read: part.step is a STEP file; the proposal must be a mesh or a density"
+        );
         assert_eq!(failure.code, 2);
         assert!(failure.hint.is_some());
         assert_eq!(one_line("a\n  b"), "a b");

@@ -18,7 +18,10 @@ use crate::{settings, summary};
 pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
     let mut short = Vec::new();
     short.extend(args.voxel.map(|mm| ("remesh.voxel", mm.to_string())));
-    short.extend(args.quad_size.map(|mm| ("skeleton.quad_size", mm.to_string())));
+    short.extend(
+        args.quad_size
+            .map(|mm| ("skeleton.quad_size", mm.to_string())),
+    );
     short.extend(args.iso.map(|value| ("read.threshold", value.to_string())));
     short.extend(args.strict.then(|| ("repair.strict", "true".to_owned())));
     let job = ReconstructJob {
@@ -35,32 +38,66 @@ pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
 /// `grassfire demo`: the example's files are part of the program and are written next to the results.
 pub fn demo_command(args: &DemoArgs) -> Result<u8, Failure> {
     let Example::Wishbone = args.example;
-    let output = args.output.clone().unwrap_or_else(|| PathBuf::from("out/wishbone"));
+    let output = args
+        .output
+        .clone()
+        .unwrap_or_else(|| PathBuf::from("out/wishbone"));
     let options = options(&[], &args.run)?;
     let input = output.join("input");
-    let part = unpack(&input, "proposal.stl", include_bytes!("../../examples/wishbone-free/proposal.stl"))?;
-    let bodies = unpack(&input, "non_design.step", include_bytes!("../../examples/wishbone-free/non_design.step"))?;
+    let part = unpack(
+        &input,
+        "proposal.stl",
+        include_bytes!("../../examples/wishbone-free/proposal.stl"),
+    )?;
+    let bodies = unpack(
+        &input,
+        "non_design.step",
+        include_bytes!("../../examples/wishbone-free/non_design.step"),
+    )?;
     // STEP files need the CAD kernel.
-    let non_design = if cfg!(feature = "occt") { vec![bodies] } else { Vec::new() };
+    let non_design = if cfg!(feature = "occt") {
+        vec![bodies]
+    } else {
+        Vec::new()
+    };
     let command = command_line();
-    let job = ReconstructJob { part, non_design, skeleton: None, output, command, options };
+    let job = ReconstructJob {
+        part,
+        non_design,
+        skeleton: None,
+        output,
+        command,
+        options,
+    };
     run(&job, &args.run)
 }
 
 fn unpack(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, Failure> {
     let path = folder.join(name);
-    let refuse = |e: std::io::Error| Failure::usage(format!("cannot write {}: {e}", path.display()), None);
+    let refuse =
+        |e: std::io::Error| Failure::usage(format!("cannot write {}: {e}", path.display()), None);
     std::fs::create_dir_all(folder).map_err(refuse)?;
     std::fs::write(&path, bytes).map_err(refuse)?;
     Ok(path)
 }
 
 fn command_line() -> String {
-    std::env::args_os().map(|arg| arg.to_string_lossy().into_owned()).enumerate().fold(String::new(), |line, (n, arg)| {
-        let arg = if n == 0 { "grassfire".to_owned() } else { arg };
-        let quoted = if arg.contains([' ', '\'', '"']) { format!("{arg:?}") } else { arg };
-        if line.is_empty() { quoted } else { format!("{line} {quoted}") }
-    })
+    std::env::args_os()
+        .map(|arg| arg.to_string_lossy().into_owned())
+        .enumerate()
+        .fold(String::new(), |line, (n, arg)| {
+            let arg = if n == 0 { "grassfire".to_owned() } else { arg };
+            let quoted = if arg.contains([' ', '\'', '"']) {
+                format!("{arg:?}")
+            } else {
+                arg
+            };
+            if line.is_empty() {
+                quoted
+            } else {
+                format!("{line} {quoted}")
+            }
+        })
 }
 
 /// Defaults, then the short options, then every `--set` in its order.
@@ -85,8 +122,15 @@ fn run(job: &ReconstructJob, args: &RunArgs) -> Result<u8, Failure> {
         (_, true) => Talk::Verbose,
         _ => Talk::Normal,
     };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(job.options.threads).build_global();
-    pool.map_err(|e| Failure::usage(format!("cannot start {} threads: {e}", job.options.threads), None))?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(job.options.threads)
+        .build_global();
+    pool.map_err(|e| {
+        Failure::usage(
+            format!("cannot start {} threads: {e}", job.options.threads),
+            None,
+        )
+    })?;
     let bar = Arc::new(Bar::new(talk));
     let monitor = Arc::new(Monitor::with_progress(Box::new(Shared(Arc::clone(&bar)))));
     cancel_on_interrupt(&monitor)?;
@@ -99,7 +143,11 @@ fn run(job: &ReconstructJob, args: &RunArgs) -> Result<u8, Failure> {
     }
     let outcome = result?;
     say(&outcome, job, args)?;
-    Ok(if outcome.failed_checks.is_empty() { 0 } else { 1 })
+    Ok(if outcome.failed_checks.is_empty() {
+        0
+    } else {
+        1
+    })
 }
 
 /// The first Ctrl-C asks the stages to stop, the second ends the program at once.
@@ -112,7 +160,8 @@ fn cancel_on_interrupt(monitor: &Arc<Monitor>) -> Result<(), Failure> {
         }
         monitor.cancel();
     };
-    ctrlc::set_handler(handler).map_err(|e| Failure::usage(format!("cannot catch Ctrl-C: {e}"), None))
+    ctrlc::set_handler(handler)
+        .map_err(|e| Failure::usage(format!("cannot catch Ctrl-C: {e}"), None))
 }
 
 fn say(outcome: &Outcome, job: &ReconstructJob, args: &RunArgs) -> Result<(), Failure> {

@@ -86,8 +86,7 @@ fn reconstruct_help_is_complete() {
       <PART>  Mesh (STL, OBJ, PLY, OFF, 3MF) or density (VTI, VTU, NPY)
 
     Options:
-          --design-space <FILE>  Design space, to check that the solid stays inside (STEP or STL)
-          --non-design <FILE>    Body that must be in the solid as given (STEP or STL); may be repeated
+          --non-design <FILE>  Body that must be in the solid as given (STEP or STL); may be repeated
           --skeleton <FILE>      Quad skeleton to use instead of our own (PLY or OBJ)
           --voxel <MM>           Edge of a voxel, mm (remesh.voxel)
           --quad-size <MM>       Edge of a skeleton quad, mm (skeleton.quad_size)

@@ -35,7 +35,7 @@ impl Default for Limits {
             volume: 0.02,
             g1: 0.01,
             volume_check: 1e-4,
-            non_design: 0.01,
+            non_design: 1e-3,
         }
     }
 }

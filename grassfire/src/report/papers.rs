@@ -35,15 +35,29 @@ pub const ALL: &[Paper] = &[
         key: "barill2018",
         citation: "G. Barill, N. G. Dickson, R. Schmidt, D. I. W. Levin, A. Jacobson (2018): Fast winding numbers for soups and clouds. ACM Transactions on Graphics 37(4).",
         doi: "10.1145/3197517.3201337",
-        stages: &["input", "remesh"],
+        stages: &["read", "remesh"],
         used_for: "inside and outside of dirty meshes",
     },
     Paper {
-        key: "gibson1998",
-        citation: "S. F. F. Gibson (1998): Constrained elastic surface nets: generating smooth surfaces from binary segmented data. MICCAI, LNCS 1496.",
-        doi: "10.1007/BFb0056277",
+        key: "zhao2005",
+        citation: "H. Zhao (2005): A fast sweeping method for Eikonal equations. Mathematics of Computation 74.",
+        doi: "10.1090/S0025-5718-04-01678-3",
         stages: &["remesh"],
-        used_for: "closed surfaces from voxels",
+        used_for: "distances far from the surface",
+    },
+    Paper {
+        key: "bertrand1994",
+        citation: "G. Bertrand, G. Malandain (1994): A new characterization of three-dimensional simple points. Pattern Recognition Letters 15(2).",
+        doi: "10.1016/0167-8655(94)90046-9",
+        stages: &["remesh"],
+        used_for: "voxels that can change without changing the topology",
+    },
+    Paper {
+        key: "nielson2004",
+        citation: "G. M. Nielson (2004): Dual marching cubes. IEEE Visualization.",
+        doi: "10.1109/VISUAL.2004.28",
+        stages: &["remesh"],
+        used_for: "closed manifold surfaces from voxels",
     },
     Paper {
         key: "ju2002",
@@ -53,38 +67,31 @@ pub const ALL: &[Paper] = &[
         used_for: "placing surface points on features",
     },
     Paper {
-        key: "taubin1995",
-        citation: "G. Taubin (1995): A signal processing approach to fair surface design. SIGGRAPH.",
-        doi: "10.1145/218380.218473",
-        stages: &["remesh"],
-        used_for: "smoothing without shrinking",
-    },
-    Paper {
         key: "bowyer1981",
         citation: "A. Bowyer (1981): Computing Dirichlet tessellations. The Computer Journal 24(2).",
         doi: "10.1093/comjnl/24.2.162",
-        stages: &["medial"],
+        stages: &["poles", "medial"],
         used_for: "incremental Delaunay triangulation",
     },
     Paper {
         key: "watson1981",
         citation: "D. F. Watson (1981): Computing the n-dimensional Delaunay tessellation with application to Voronoi polytopes. The Computer Journal 24(2).",
         doi: "10.1093/comjnl/24.2.167",
-        stages: &["medial"],
+        stages: &["poles", "medial"],
         used_for: "incremental Delaunay triangulation",
     },
     Paper {
         key: "shewchuk1997",
         citation: "J. R. Shewchuk (1997): Adaptive precision floating-point arithmetic and fast robust geometric predicates. Discrete & Computational Geometry 18.",
         doi: "10.1007/PL00009321",
-        stages: &["medial"],
+        stages: &["poles", "medial"],
         used_for: "exact predicates",
     },
     Paper {
         key: "amenta2001",
-        citation: "N. Amenta, S. Choi, R. K. Kolluri (2001): The power crust. ACM Symposium on Solid Modeling.",
-        doi: "10.1145/376957.376986",
-        stages: &["medial"],
+        citation: "N. Amenta, S. Choi, R. K. Kolluri (2001): The power crust, unions of balls, and the medial axis transform. Computational Geometry 19.",
+        doi: "10.1016/S0925-7721(01)00017-7",
+        stages: &["poles"],
         used_for: "poles and local feature size",
     },
     Paper {
@@ -102,11 +109,32 @@ pub const ALL: &[Paper] = &[
         used_for: "a medial axis with the topology of the voxel solid",
     },
     Paper {
+        key: "li2015",
+        citation: "P. Li, B. Wang, F. Sun, X. Guo, C. Zhang, W. Wang (2015): Q-MAT: computing medial axis transform by quadratic error minimization. ACM Transactions on Graphics 35(1).",
+        doi: "10.1145/2753755",
+        stages: &["medial"],
+        used_for: "medial spheres fitted to the smooth surface",
+    },
+    Paper {
         key: "dey1999",
         citation: "T. K. Dey, H. Edelsbrunner, S. Guha, D. V. Nekhayev (1999): Topology preserving edge contraction. Publications de l'Institut Mathématique (Beograd) 66.",
         doi: "",
         stages: &["skeleton"],
         used_for: "the link condition: contractions that keep the topology",
+    },
+    Paper {
+        key: "taubin1995",
+        citation: "G. Taubin (1995): A signal processing approach to fair surface design. SIGGRAPH.",
+        doi: "10.1145/218380.218473",
+        stages: &["skeleton"],
+        used_for: "smooth seams and rims that do not shrink",
+    },
+    Paper {
+        key: "bouaziz2012",
+        citation: "S. Bouaziz, M. Deuss, Y. Schwartzburg, T. Weise, M. Pauly (2012): Shape-up: shaping discrete geometry with projections. Computer Graphics Forum 31(5).",
+        doi: "10.1111/j.1467-8659.2012.03171.x",
+        stages: &["skeleton"],
+        used_for: "quads that are nearly squares",
     },
     Paper {
         key: "wang2008",
@@ -142,6 +170,13 @@ pub const ALL: &[Paper] = &[
         doi: "10.1111/j.1467-8659.2008.01288.x",
         stages: &["spline"],
         used_for: "few large faces from many patches",
+    },
+    Paper {
+        key: "andrade2012",
+        citation: "D. V. Andrade, M. G. C. Resende, R. F. Werneck (2012): Fast local search for the maximum independent set problem. Journal of Heuristics 18.",
+        doi: "10.1007/s10732-012-9196-4",
+        stages: &["spline"],
+        used_for: "which borders between faces can go",
     },
 ];
 
@@ -187,7 +222,7 @@ mod tests {
             .iter()
             .map(|paper| paper.key)
             .collect();
-        assert_eq!(keys, ["loop2008", "eppstein2008"]);
+        assert_eq!(keys, ["loop2008", "eppstein2008", "andrade2012"]);
         assert!(find("yan2018").is_some() && find("nobody").is_none());
     }
 }

@@ -62,10 +62,12 @@ impl Studio {
         )
     }
 
-    /// Wall thickness: `thickness` has one value in mm a point.
-    pub fn thickness(&self, mesh: &TriMesh, thickness: &[f64]) -> Result<Picture, RenderError> {
-        let legend = Legend::spanning("thickness, mm", thickness, ColourMap::Viridis);
-        let colours = thickness.iter().map(|t| legend.colour(*t)).collect();
+    /// Wall thickness: `feature_size` has one value in mm a point, the distance to the medial axis, which is half the
+    /// wall.
+    pub fn thickness(&self, mesh: &TriMesh, feature_size: &[f64]) -> Result<Picture, RenderError> {
+        let walls: Vec<f64> = feature_size.iter().map(|r| 2.0 * r).collect();
+        let legend = Legend::spanning("wall thickness, mm", &walls, ColourMap::Viridis);
+        let colours = walls.iter().map(|t| legend.colour(*t)).collect();
         let mesh = SceneMesh {
             colours: Colours::Points(colours),
             ..smooth(mesh)

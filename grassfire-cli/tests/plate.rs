@@ -1,0 +1,190 @@
+//! A plate with a hole, made here: the whole chain without the corpus, a skeleton fed back, exit codes, Ctrl-C.
+
+mod support;
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde_json::Value;
+use support::{Run, finish, number, plate_with_hole, reconstruct, start};
+
+const SIDE: f64 = 40.0;
+const HOLE: f64 = 10.0;
+const THICK: f64 = 5.0;
+
+fn plate(folder: &Path) -> PathBuf {
+    let path = folder.join("plate.stl");
+    std::fs::write(&path, plate_with_hole(SIDE, HOLE, THICK)).expect("writes");
+    path
+}
+
+/// Runs the plate at a voxel of 0.8 mm.
+fn run(folder: &Path, args: &[&str]) -> Run {
+    let all: Vec<&str> = ["--voxel", "0.8"].iter().chain(args).copied().collect();
+    reconstruct(&plate(folder), &folder.join("out"), &all)
+}
+
+#[test]
+fn plate_becomes_a_good_part() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = run(folder.path(), &["--json"]);
+    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+    let printed: Value = serde_json::from_str(&run.stdout).expect("--json prints JSON");
+    assert_eq!(printed, run.report());
+    // The hole is a polygon with 64 corners, which takes less than a circle does.
+    let hole = 32.0 * HOLE * HOLE * (std::f64::consts::TAU / 64.0).sin();
+    let volume = (SIDE * SIDE - hole) * THICK;
+    let off = number(&printed, "/input/volume") / volume - 1.0;
+    assert!(off.abs() < 1e-6, "{off}");
+    assert_eq!(printed["remesh"]["genus_after"], 1);
+    assert_eq!(
+        printed["topology"]["solid"],
+        printed["topology"]["skeleton"]
+    );
+    if cfg!(feature = "occt") {
+        let solid = &printed["solid"];
+        assert_eq!(
+            (&solid["valid"], solid["genus"].as_i64()),
+            (&Value::Bool(true), Some(1))
+        );
+    }
+    let listed = printed["files"].as_array().expect("files");
+    for file in listed {
+        let name = file["path"].as_str().expect("a name");
+        assert!(run.output.join(name).is_file(), "{name}");
+    }
+}
+
+#[test]
+fn skeleton_comes_back_as_ply_and_as_obj() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let first = run(folder.path(), &[]);
+    let (quads, topology) = {
+        let report = first.report();
+        (
+            report["skeleton"]["quads"].clone(),
+            report["topology"]["skeleton"].clone(),
+        )
+    };
+    let ply = folder.path().join("mine.ply");
+    std::fs::write(&ply, first.file("skeleton.ply")).expect("writes");
+    let obj = folder.path().join("mine.obj");
+    std::fs::write(&obj, obj_of(&first.file("skeleton.ply"))).expect("writes");
+    for skeleton in [ply, obj] {
+        let again = run(
+            folder.path(),
+            &["--skeleton", &skeleton.display().to_string()],
+        );
+        assert!(matches!(again.code, Some(0 | 1)), "{}", again.stderr);
+        let report = again.report();
+        assert_eq!(report["skeleton"]["quads"], quads, "{}", skeleton.display());
+        assert_eq!(
+            report["topology"]["skeleton"],
+            topology,
+            "{}",
+            skeleton.display()
+        );
+        assert!(number(&report, "/volume/relative_difference").abs() < 0.02);
+        if cfg!(feature = "occt") {
+            assert_eq!(report["solid"]["valid"], true);
+        }
+    }
+}
+
+/// The points and quads of a text PLY as OBJ, as a modeller would export them: without radii.
+fn obj_of(ply: &[u8]) -> String {
+    let text = String::from_utf8_lossy(ply);
+    let (header, body) = text.split_once("end_header\n").expect("a text PLY");
+    assert!(header.contains("format ascii"), "{header}");
+    let count = |name: &str| {
+        let line = header.lines().find_map(|line| line.strip_prefix(name));
+        line.and_then(|n| n.trim().parse::<usize>().ok())
+            .unwrap_or(0)
+    };
+    let lines: Vec<Vec<&str>> = body
+        .lines()
+        .map(|line| line.split_whitespace().collect())
+        .collect();
+    let (points, faces) = (count("element vertex "), count("element face "));
+    let mut obj = String::new();
+    for point in &lines[..points] {
+        obj += &format!("v {}\n", point[..3].join(" "));
+    }
+    for face in &lines[points..points + faces] {
+        let corners = face[1..5]
+            .iter()
+            .map(|v| v.parse::<usize>().expect("an index") + 1);
+        obj += &format!(
+            "f {}\n",
+            corners.map(|v| v.to_string()).collect::<Vec<_>>().join(" ")
+        );
+    }
+    obj
+}
+
+#[test]
+fn a_stage_that_fails_ends_with_3() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = run(folder.path(), &["--set", "retry.quad_sizes=[]"]);
+    assert_eq!(run.code, Some(3), "{}", run.stderr);
+    assert_eq!(
+        (run.lines("error: ").len(), run.lines("hint: ").len()),
+        (1, 1),
+        "{}",
+        run.stderr
+    );
+    assert!(!run.output.join("part.step").exists() && !run.output.join("report.json").exists());
+}
+
+#[test]
+fn a_missed_check_ends_with_1_and_everything_is_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = run(folder.path(), &["--set", "report.limits.distance_rms=0"]);
+    assert_eq!(run.code, Some(1), "{}", run.stderr);
+    assert!(
+        run.stdout.contains("not met") && run.stdout.contains("distance.rms"),
+        "{}",
+        run.stdout
+    );
+    assert!(run.output.join("report.html").is_file() && run.output.join("body.obj").is_file());
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_with_130_and_leaves_no_half_written_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = folder.path().join("out");
+    // Fine enough to run for a while after the first file.
+    let child = start(&plate(folder.path()), &output, &["--voxel", "0.25"]);
+    let begin = std::time::Instant::now();
+    while !output.join("proposal.stl").exists() && begin.elapsed() < Duration::from_secs(300) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let kill = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(kill.expect("kill runs").success());
+    let run = finish(child, &output);
+    assert_eq!(run.code, Some(130), "{}", run.stderr);
+    assert!(!output.join("report.json").exists() && !output.join("part.step").exists());
+    let names: Vec<String> = std::fs::read_dir(&output)
+        .expect("the folder is there")
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .collect();
+    let whole = [
+        "proposal.stl",
+        "poles.ply",
+        "thickness.ply",
+        "medial.ma",
+        "skeleton.ply",
+        "body.obj",
+        "body.stl",
+    ];
+    assert!(
+        names.iter().all(|name| whole.contains(&name.as_str())),
+        "{names:?}"
+    );
+    let proposal = run.file("proposal.stl");
+    let triangles = u32::from_le_bytes([proposal[80], proposal[81], proposal[82], proposal[83]]);
+    assert_eq!(proposal.len(), 84 + 50 * triangles as usize);
+}

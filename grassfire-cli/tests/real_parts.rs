@@ -1,0 +1,182 @@
+//! Real parts of the corpus through the program, with default options and nothing but a file name.
+
+#![cfg(feature = "occt")]
+
+#[path = "../../grassfire/tests/bad_corpus/mod.rs"]
+#[allow(dead_code, reason = "only the folder of the corpus is wanted here")]
+mod bad_corpus;
+mod support;
+
+use std::path::Path;
+
+use bad_corpus::corpus;
+use serde_json::Value;
+use support::{Run, number, reconstruct};
+
+/// Runs a part of the corpus; none without a corpus.
+fn run(name: &str, args: &[&str]) -> Option<(tempfile::TempDir, Run)> {
+    let part = corpus()?.join("dev").join(name);
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = reconstruct(&part, &folder.path().join("out"), args);
+    println!(
+        "{name}: exit {:?}, {:.1} s, {:.0} MB\n{}",
+        run.code, run.seconds, run.peak_memory, run.stdout
+    );
+    Some((folder, run))
+}
+
+/// What every good part must show, whatever its shape.
+fn must_be_good(run: &Run) -> Value {
+    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+    let report = run.report();
+    for check in report["checks"].as_array().expect("checks") {
+        assert_eq!(check["met"], true, "{check}");
+    }
+    let topology = &report["topology"];
+    assert_eq!(topology["solid"], topology["complex"]);
+    assert_eq!(topology["solid"], topology["skeleton"]);
+    let body = topology["body"].as_array().expect("surfaces of the body");
+    let chi: i64 = body.iter().filter_map(|shell| shell["chi"].as_i64()).sum();
+    assert_eq!(
+        Some(chi),
+        topology["skeleton"]["chi"].as_i64().map(|chi| 2 * chi)
+    );
+    for shell in body {
+        assert_eq!(
+            (&shell["closed"], &shell["manifold"]),
+            (&Value::Bool(true), &Value::Bool(true))
+        );
+    }
+    let solid = &report["solid"];
+    assert_eq!(
+        (&solid["valid"], solid["bodies"].as_u64()),
+        (&Value::Bool(true), Some(1))
+    );
+    assert_eq!(solid["genus"], report["remesh"]["genus_after"]);
+    let voxel = number(&report, "/distance/voxel");
+    let at_most = |pointer: &str, limit: f64| {
+        let value = number(&report, pointer).abs();
+        assert!(value <= limit, "{pointer} is {value}, at most {limit}");
+    };
+    at_most("/solid/g1_max", 0.01);
+    at_most("/solid/volume_check", 1e-4);
+    at_most("/distance/rms", 0.5 * voxel);
+    at_most("/distance/p95", voxel);
+    at_most("/volume/relative_difference", 0.02);
+    assert!(run.peak_memory <= 2048.0, "{} MB", run.peak_memory);
+    report
+}
+
+/// A part whose tunnels are all real: the solid has the genus of the file.
+fn bracket(name: &str, genus: i64) {
+    let Some((_folder, run)) = run(name, &[]) else {
+        return;
+    };
+    let report = must_be_good(&run);
+    assert_eq!(report["solid"]["genus"].as_i64(), Some(genus));
+}
+
+#[test]
+fn simjeb_055_becomes_a_good_solid() {
+    bracket("simjeb_055.obj", 9);
+}
+
+#[test]
+fn simjeb_398_becomes_a_good_solid() {
+    bracket("simjeb_398.obj", 7);
+}
+
+#[test]
+fn simjeb_576_becomes_a_good_solid() {
+    bracket("simjeb_576.obj", 13);
+}
+
+#[test]
+fn simjeb_623_becomes_a_good_solid() {
+    bracket("simjeb_623.obj", 9);
+}
+
+#[test]
+fn strap_becomes_a_good_solid_and_every_closed_tunnel_is_named() {
+    let Some((_folder, run)) = run("abc_00000125_strap.obj", &[]) else {
+        return;
+    };
+    let report = must_be_good(&run);
+    let closed = report["remesh"]["changes"].as_array().map_or(0, Vec::len);
+    assert_eq!(report["solid"]["genus"].as_i64(), Some(3 - closed as i64));
+}
+
+#[test]
+fn rings_stay_in_the_bracket_as_given() {
+    let Some(corpus) = corpus() else { return };
+    let rings = corpus.join("dev/ge_solid_domain.stl");
+    let rings = rings.display().to_string();
+    let Some((_folder, run)) = run("simjeb_398.obj", &["--non-design", &rings]) else {
+        return;
+    };
+    let report = must_be_good(&run);
+    let bodies = report["non_design"].as_array().expect("non-design bodies");
+    assert_eq!(bodies.len(), 6);
+    let step = String::from_utf8_lossy(&run.file("part.step")).into_owned();
+    let cylinders = cylinder_radii(&step);
+    for body in bodies {
+        assert_eq!(body["kept"], true, "{body}");
+        for radius in body["bore_radii"].as_array().expect("radii") {
+            let radius = radius.as_f64().expect("a number");
+            let found = cylinders.iter().any(|r| (r - radius).abs() < 1e-6);
+            assert!(found, "no cylinder of radius {radius} in {cylinders:?}");
+        }
+    }
+    assert!(number(&report, "/distance/non_design_max") <= 1e-3);
+}
+
+/// Radii of all cylinders of a STEP file.
+fn cylinder_radii(step: &str) -> Vec<f64> {
+    let one_line: String = step.split_whitespace().collect();
+    one_line
+        .split("CYLINDRICAL_SURFACE(")
+        .skip(1)
+        .filter_map(|rest| rest.split(')').next()?.rsplit(',').next()?.parse().ok())
+        .collect()
+}
+
+#[test]
+fn one_and_two_threads_write_the_same_bytes() {
+    let name = "simjeb_576.obj";
+    let (Some((_one, one)), Some((_two, two))) = (
+        run(name, &["--threads", "1"]),
+        run(name, &["--threads", "2"]),
+    ) else {
+        return;
+    };
+    for file in [
+        "skeleton.ply",
+        "body.obj",
+        "part.step",
+        "medial.ma",
+        "proposal.stl",
+    ] {
+        let same = without_time(&one.file(file)) == without_time(&two.file(file));
+        assert!(same, "{file} depends on the number of threads");
+    }
+}
+
+/// A file without the line that carries the time of writing (STEP's `FILE_NAME`).
+fn without_time(bytes: &[u8]) -> Vec<u8> {
+    let lines = bytes.split_inclusive(|byte| *byte == b'\n');
+    let kept = lines.filter(|line| !line.starts_with(b"FILE_NAME"));
+    kept.flatten().copied().collect()
+}
+
+#[test]
+fn the_second_run_into_a_folder_leaves_no_file_of_the_first() {
+    let Some(corpus) = corpus() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = folder.path().join("out");
+    let strap = corpus.join("dev/abc_00000125_strap.obj");
+    let first = reconstruct(&strap, &output, &[]);
+    assert!(Path::new(&first.output).join("part.step").is_file());
+    let second = reconstruct(&strap, &output, &["--set", "retry.quad_sizes=[]"]);
+    assert_eq!(second.code, Some(3), "{}", second.stderr);
+    assert!(output.join("proposal.stl").is_file() && !output.join("part.step").exists());
+}
