@@ -71,6 +71,8 @@ pub(super) fn body_block(shape: &Shape) -> BodyBlock {
         quads: mesh.quads.len(),
         extraordinary: valence.iter().filter(|n| **n != 4 && **n != 0).count(),
         self_intersections: shape.fitted.self_intersections.len(),
+        folds: super::shape::flipped(&shape.fitted),
+        construction: if shape.wrapped { "wrapped" } else { "thickened" }.to_owned(),
     }
 }
 

@@ -70,8 +70,12 @@ pub(super) fn shape(
                     return Ok(shape);
                 }
                 monitor.warn("fit", format!("{name}: {score}"));
+                let hopeless = score.hopeless();
                 if best.as_ref().is_none_or(|(least, _)| score.worse() < least.worse()) {
                     best = Some((score, shape));
+                }
+                if hopeless {
+                    break;
                 }
             }
             Err(error) if error.is_cancelled() => return Err(error),
@@ -122,12 +126,16 @@ fn wrapped(
 struct Score {
     /// Places where it cuts itself.
     crossings: usize,
+    /// Patches whose normal flips over.
+    folds: usize,
     /// Distance and volume over their limits, the largest ratio; above 1 a limit is exceeded.
     excess: f64,
 }
 
 /// The fit measures on its own samples; the final figures may be a little worse.
 const MARGIN: f64 = 0.95;
+/// Bodies that miss a limit by more than this factor and cut themselves are given up.
+const HOPELESS: f64 = 3.0;
 
 impl Score {
     fn of(fitted: &Fitted, voxel: f64, limits: &Limits) -> Self {
@@ -135,22 +143,33 @@ impl Score {
         let rms = both.iter().map(|d| d.rms).fold(0.0, f64::max) / (voxel * limits.distance_rms);
         let p95 = both.iter().map(|d| d.p95).fold(0.0, f64::max) / (voxel * limits.distance_p95);
         let volume = (fitted.volume / fitted.iso_volume - 1.0).abs() / limits.volume;
-        Self { crossings: fitted.self_intersections.len(), excess: rms.max(p95).max(volume) / MARGIN }
+        Self { crossings: fitted.self_intersections.len(), folds: flipped(fitted), excess: rms.max(p95).max(volume) / MARGIN }
     }
 
     fn good(&self) -> bool {
-        self.crossings == 0 && self.excess <= 1.0
+        self.crossings + self.folds == 0 && self.excess <= 1.0
+    }
+
+    /// So far off that other quad sizes do not help: the part is not made of sheets and members.
+    fn hopeless(&self) -> bool {
+        self.crossings > 0 && self.excess > HOPELESS
     }
 
     /// Orders tries: soundness first, then closeness.
-    fn worse(&self) -> (usize, f64) {
-        (self.crossings, self.excess)
+    fn worse(&self) -> (usize, usize, f64) {
+        (self.crossings, self.folds, self.excess)
     }
+}
+
+/// Patches of a fitted body whose normal flips over somewhere.
+pub(super) fn flipped(fitted: &Fitted) -> usize {
+    fitted.folds.iter().filter(|fold| fold.value < 0.0).count()
 }
 
 impl std::fmt::Display for Score {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.crossings {
+            0 if self.folds > 0 => write!(f, "{} faces of the body fold over", self.folds),
             0 => write!(f, "the body misses the proposal by {:.2} times the limits for distance and volume", self.excess),
             places => write!(f, "the body cuts itself at {places} places"),
         }

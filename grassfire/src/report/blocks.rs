@@ -211,6 +211,10 @@ pub struct BodyBlock {
     pub extraordinary: usize,
     /// Pairs of faces that cut each other.
     pub self_intersections: usize,
+    /// Patches whose normal flips over somewhere.
+    pub folds: usize,
+    /// `thickened` from the skeleton, or `wrapped` around the proposal where the part is too bulky for that.
+    pub construction: String,
 }
 
 /// The CAD solid.
