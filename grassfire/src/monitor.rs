@@ -36,7 +36,10 @@ pub struct Monitor {
 impl Monitor {
     /// A monitor that reports progress to `progress`.
     pub fn with_progress(progress: Box<dyn Progress>) -> Self {
-        Self { progress: Some(progress), ..Self::default() }
+        Self {
+            progress: Some(progress),
+            ..Self::default()
+        }
     }
 
     /// Asks all stages to stop at their next [`Monitor::check`].
@@ -46,7 +49,11 @@ impl Monitor {
 
     /// `Err(Cancelled)` once [`Monitor::cancel`] was called; stages call it in every long loop.
     pub fn check(&self) -> Result<(), Cancelled> {
-        if self.cancelled.load(Ordering::Relaxed) { Err(Cancelled) } else { Ok(()) }
+        if self.cancelled.load(Ordering::Relaxed) {
+            Err(Cancelled)
+        } else {
+            Ok(())
+        }
     }
 
     /// Tells how far `stage` is and checks for cancellation.
@@ -59,7 +66,10 @@ impl Monitor {
 
     /// Records partial trouble for the report.
     pub fn warn(&self, stage: &str, text: impl Into<String>) {
-        let warning = Warning { stage: stage.to_owned(), text: text.into() };
+        let warning = Warning {
+            stage: stage.to_owned(),
+            text: text.into(),
+        };
         if let Ok(mut list) = self.warnings.lock() {
             list.push(warning);
         }
@@ -67,6 +77,9 @@ impl Monitor {
 
     /// All warnings so far, in order.
     pub fn warnings(&self) -> Vec<Warning> {
-        self.warnings.lock().map(|list| list.clone()).unwrap_or_default()
+        self.warnings
+            .lock()
+            .map(|list| list.clone())
+            .unwrap_or_default()
     }
 }

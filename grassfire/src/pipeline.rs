@@ -130,18 +130,31 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
     record.report.inputs = record.stage("read", || inputs::fingerprints(job, monitor))?;
     record.report.input = Some(proposal.block());
 
-    let remeshed = record.stage("remesh", || inputs::remesh(&proposal, &bodies, options, monitor))?;
+    let remeshed = record.stage("remesh", || {
+        inputs::remesh(&proposal, &bodies, options, monitor)
+    })?;
     record.report.remesh = Some(measure::remesh_block(&remeshed));
     let voxel = remeshed.field.spacing;
     let delivery = record.stage("write", || Delivery::open(&job.output))?;
     record.stage("write", || delivery.proposal(&remeshed.solid))?;
 
-    let poles = record.stage("poles", || medial::poles(&remeshed.solid, &options.poles, monitor))?;
+    let poles = record.stage("poles", || {
+        medial::poles(&remeshed.solid, &options.poles, monitor)
+    })?;
     record.stage("write", || delivery.poles(&poles, &remeshed.solid))?;
-    let axis = record.stage("medial", || medial::medial_axis(&remeshed.field, &options.medial, monitor))?;
+    let axis = record.stage("medial", || {
+        medial::medial_axis(&remeshed.field, &options.medial, monitor)
+    })?;
     record.stage("write", || delivery.medial(&axis.mesh))?;
 
-    let shape = shape::shape(&mut record, &axis, &remeshed, drawn.as_ref(), options, monitor)?;
+    let shape = shape::shape(
+        &mut record,
+        &axis,
+        &remeshed,
+        drawn.as_ref(),
+        options,
+        monitor,
+    )?;
     record.report.topology = Some(measure::topology_block(&axis, &shape));
     record.report.skeleton = Some(measure::skeleton_block(&axis, &shape));
     record.report.body = Some(measure::body_block(&shape));
@@ -150,26 +163,53 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
 
     let mesh = &shape.fitted.mesh;
     let surface = record.stage("spline", || shape::surface(mesh, voxel, options, monitor))?;
-    record.stage("write", || delivery.stl("body.stl", &surface.tessellation.mesh))?;
+    record.stage("write", || {
+        delivery.stl("body.stl", &surface.tessellation.mesh)
+    })?;
     let intersections = shape.fitted.self_intersections.len();
-    let part = record.stage("cad", || union::part(&surface, &bodies, intersections, voxel, options, monitor))?;
+    let part = record.stage("cad", || {
+        union::part(&surface, &bodies, intersections, voxel, options, monitor)
+    })?;
     record.report.solid = part.block.clone();
     record.report.non_design = part.non_design.clone();
-    record.stage("write", || union::deliver(&part, &product_name(&job.part), &delivery))?;
+    record.stage("write", || {
+        union::deliver(&part, &product_name(&job.part), &delivery)
+    })?;
 
-    let deviation = record.stage("measure", || measure::deviation(&remeshed, &part, &bodies, monitor))?;
+    let deviation = record.stage("measure", || {
+        measure::deviation(&remeshed, &part, &bodies, monitor)
+    })?;
     record.report.distance = Some(measure::distance_block(&deviation, &remeshed, &part));
     record.report.volume = Some(measure::volume_block(&remeshed, &part));
 
     let pictures = record.stage("pictures", || {
-        illustrate::pictures(&remeshed, &poles, &axis, &shape, &part, &options.report, monitor)
+        illustrate::pictures(
+            &remeshed,
+            &poles,
+            &axis,
+            &shape,
+            &part,
+            &options.report,
+            monitor,
+        )
     })?;
     let failed_checks = record.finish(&options.report.limits, monitor);
-    delivery.report(&mut record.report, &pictures).map_err(|source| PipelineError { stage: "report", source })?;
-    Ok(Outcome { report: record.report, failed_checks })
+    delivery
+        .report(&mut record.report, &pictures)
+        .map_err(|source| PipelineError {
+            stage: "report",
+            source,
+        })?;
+    Ok(Outcome {
+        report: record.report,
+        failed_checks,
+    })
 }
 
 /// Name of the product in the STEP file: the proposal's file name.
 fn product_name(part: &Path) -> String {
-    part.file_stem().map_or_else(|| "part".to_owned(), |stem| stem.to_string_lossy().into_owned())
+    part.file_stem().map_or_else(
+        || "part".to_owned(),
+        |stem| stem.to_string_lossy().into_owned(),
+    )
 }

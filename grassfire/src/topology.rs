@@ -18,7 +18,12 @@ pub struct Betti {
 impl Betti {
     /// From components, cavities and Euler number: `b1 = b0 + b2 - chi`.
     pub fn from_chi(b0: i64, b2: i64, chi: i64) -> Self {
-        Self { b0, b1: b0 + b2 - chi, b2, chi }
+        Self {
+            b0,
+            b1: b0 + b2 - chi,
+            b2,
+            chi,
+        }
     }
 }
 

@@ -18,7 +18,12 @@ pub struct VoxelGrid<T> {
 impl<T: Clone> VoxelGrid<T> {
     /// A grid filled with `value`.
     pub fn filled(origin: Vec3, spacing: f64, dims: [usize; 3], value: T) -> Self {
-        Self { origin, spacing, dims, values: vec![value; dims[0] * dims[1] * dims[2]] }
+        Self {
+            origin,
+            spacing,
+            dims,
+            values: vec![value; dims[0] * dims[1] * dims[2]],
+        }
     }
 }
 
@@ -81,7 +86,11 @@ impl VoxelGrid<f32> {
         let mut t = [0.0; 3];
         for a in 0..3 {
             let last = self.dims[a].saturating_sub(1);
-            let x = if g[a].is_finite() { g[a].clamp(0.0, last as f64) } else { 0.0 };
+            let x = if g[a].is_finite() {
+                g[a].clamp(0.0, last as f64)
+            } else {
+                0.0
+            };
             cell[a] = (x as usize).min(last.saturating_sub(1));
             t[a] = x - cell[a] as f64;
         }
@@ -108,8 +117,13 @@ impl VoxelGrid<f32> {
         let mut gradient = Vec3::zeros();
         for a in 0..3 {
             let back = if at[a] > 0 { stride[a] } else { 0 };
-            let ahead = if at[a] + 1 < self.dims[a] { stride[a] } else { 0 };
-            let span = (usize::from(back > 0) + usize::from(ahead > 0)).max(1) as f64 * self.spacing;
+            let ahead = if at[a] + 1 < self.dims[a] {
+                stride[a]
+            } else {
+                0
+            };
+            let span =
+                (usize::from(back > 0) + usize::from(ahead > 0)).max(1) as f64 * self.spacing;
             gradient[a] = f64::from(self.values[index + ahead] - self.values[index - back]) / span;
         }
         gradient

@@ -17,7 +17,9 @@ pub enum SolidError {
         triangle: usize,
     },
     /// An edge has not exactly one triangle on either side.
-    #[error("edge {edge:?} has {uses} triangles running along it and {opposite} against it (1 and 1 wanted); {count} such edges")]
+    #[error(
+        "edge {edge:?} has {uses} triangles running along it and {opposite} against it (1 and 1 wanted); {count} such edges"
+    )]
     BadEdge {
         /// The two point indices.
         edge: [u32; 2],
@@ -98,7 +100,9 @@ impl TryFrom<TriMesh> for Solid {
 
 fn check_triangles(mesh: &TriMesh) -> Result<(), SolidError> {
     let n = mesh.points.len();
-    let bad = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0] || t.iter().any(|&v| v as usize >= n);
+    let bad = |t: &[u32; 3]| {
+        t[0] == t[1] || t[1] == t[2] || t[2] == t[0] || t.iter().any(|&v| v as usize >= n)
+    };
     match mesh.triangles.iter().position(bad) {
         Some(triangle) => Err(SolidError::BadTriangle { triangle }),
         None => Ok(()),
@@ -106,7 +110,8 @@ fn check_triangles(mesh: &TriMesh) -> Result<(), SolidError> {
 }
 
 fn check_edges(mesh: &TriMesh) -> Result<(), SolidError> {
-    let mut edges: HashMap<[u32; 2], [usize; 2]> = HashMap::with_capacity(mesh.triangles.len() * 3 / 2);
+    let mut edges: HashMap<[u32; 2], [usize; 2]> =
+        HashMap::with_capacity(mesh.triangles.len() * 3 / 2);
     for t in &mesh.triangles {
         for k in 0..3 {
             let (a, b) = (t[k], t[(k + 1) % 3]);
@@ -116,7 +121,12 @@ fn check_edges(mesh: &TriMesh) -> Result<(), SolidError> {
     let bad = edges.iter().filter(|(_, uses)| **uses != [1, 1]);
     let count = bad.clone().count();
     match bad.min_by_key(|(edge, _)| **edge) {
-        Some((&edge, &[uses, opposite])) => Err(SolidError::BadEdge { edge, uses, opposite, count }),
+        Some((&edge, &[uses, opposite])) => Err(SolidError::BadEdge {
+            edge,
+            uses,
+            opposite,
+            count,
+        }),
         None => Ok(()),
     }
 }
@@ -146,9 +156,14 @@ fn check_fans(mesh: &TriMesh) -> Result<(), SolidError> {
         }
         true
     };
-    let bad: Vec<u32> = (0..valence.len() as u32).filter(|&v| valence[v as usize] > 0 && pinched(v)).collect();
+    let bad: Vec<u32> = (0..valence.len() as u32)
+        .filter(|&v| valence[v as usize] > 0 && pinched(v))
+        .collect();
     match bad.first() {
-        Some(&point) => Err(SolidError::Pinched { point, count: bad.len() }),
+        Some(&point) => Err(SolidError::Pinched {
+            point,
+            count: bad.len(),
+        }),
         None => Ok(()),
     }
 }

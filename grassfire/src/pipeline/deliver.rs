@@ -36,7 +36,10 @@ pub(super) struct Delivery {
 impl Delivery {
     /// Makes the folder and takes away what an earlier run left in it.
     pub(super) fn open(folder: &Path) -> Result<Self, IoError> {
-        let fail = |path: &Path, source| IoError::Write { file: path.display().to_string(), source };
+        let fail = |path: &Path, source| IoError::Write {
+            file: path.display().to_string(),
+            source,
+        };
         std::fs::create_dir_all(folder).map_err(|e| fail(folder, e))?;
         for (name, _) in FILES {
             let path = folder.join(name);
@@ -44,7 +47,9 @@ impl Delivery {
                 std::fs::remove_file(&path).map_err(|e| fail(&path, e))?;
             }
         }
-        Ok(Self { folder: folder.to_owned() })
+        Ok(Self {
+            folder: folder.to_owned(),
+        })
     }
 
     pub(super) fn path(&self, name: &str) -> PathBuf {
@@ -56,9 +61,21 @@ impl Delivery {
     }
 
     pub(super) fn poles(&self, poles: &Poles, solid: &Solid) -> Result<(), IoError> {
-        let skeleton = TriMesh { points: poles.points.clone(), triangles: poles.triangles.clone(), tags: Vec::new() };
-        io::write_ply(&self.path("poles.ply"), &skeleton, Some(("radius", &poles.radii)))?;
-        io::write_ply(&self.path("thickness.ply"), solid.mesh(), Some(("thickness", &poles.thickness)))
+        let skeleton = TriMesh {
+            points: poles.points.clone(),
+            triangles: poles.triangles.clone(),
+            tags: Vec::new(),
+        };
+        io::write_ply(
+            &self.path("poles.ply"),
+            &skeleton,
+            Some(("radius", &poles.radii)),
+        )?;
+        io::write_ply(
+            &self.path("thickness.ply"),
+            solid.mesh(),
+            Some(("thickness", &poles.thickness)),
+        )
     }
 
     pub(super) fn medial(&self, mesh: &MedialMesh) -> Result<(), IoError> {
@@ -78,10 +95,18 @@ impl Delivery {
     }
 
     /// Report and manifest; the list of files is made from what lies in the folder.
-    pub(super) fn report(&self, report: &mut Report, pictures: &[Picture]) -> Result<(), StageError> {
+    pub(super) fn report(
+        &self,
+        report: &mut Report,
+        pictures: &[Picture],
+    ) -> Result<(), StageError> {
         let entry = |&(name, text): &(&str, &str)| {
             let bytes = std::fs::metadata(self.path(name)).ok()?.len();
-            Some(FileEntry { path: name.to_owned(), text: text.to_owned(), bytes })
+            Some(FileEntry {
+                path: name.to_owned(),
+                text: text.to_owned(),
+                bytes,
+            })
         };
         report.files = FILES.iter().filter_map(entry).collect();
         report::write_html(&self.path("report.html"), report, pictures)?;
@@ -100,6 +125,8 @@ impl Delivery {
             "papers": report.papers,
         });
         let text = format!("{manifest:#}\n");
-        io::atomic_write(&self.path("manifest.json"), |out| out.write_all(text.as_bytes()))
+        io::atomic_write(&self.path("manifest.json"), |out| {
+            out.write_all(text.as_bytes())
+        })
     }
 }

@@ -26,7 +26,10 @@ pub struct PipelineError {
 
 /// The error of one stage.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant is the error of the stage it is named after")]
+#[allow(
+    missing_docs,
+    reason = "each variant is the error of the stage it is named after"
+)]
 pub enum StageError {
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -87,10 +90,16 @@ impl PipelineError {
             StageError::Spline(e) => e.hint(),
             StageError::Cad(e) => e.hint(),
             StageError::Report(e) => e.hint(),
-            StageError::StepProposal { .. } => Some("give the optimization result, and this file with --non-design".into()),
+            StageError::StepProposal { .. } => {
+                Some("give the optimization result, and this file with --non-design".into())
+            }
             StageError::DensityBody { .. } => Some("export the body from CAD as STEP".into()),
-            StageError::NoKernel { .. } => Some("build with the default feature occt, or leave out --non-design".into()),
-            StageError::NoQuadSize => Some("give at least one factor, such as retry.quad_sizes=[1.0]".into()),
+            StageError::NoKernel { .. } => {
+                Some("build with the default feature occt, or leave out --non-design".into())
+            }
+            StageError::NoQuadSize => {
+                Some("give at least one factor, such as retry.quad_sizes=[1.0]".into())
+            }
         }
     }
 

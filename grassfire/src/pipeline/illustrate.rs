@@ -40,7 +40,8 @@ pub(super) fn pictures(
         Box::new(|studio| studio.solid(&part.mesh, &bodies)),
         Box::new(|studio| studio.error(&part.mesh, &voxels)),
     ];
-    let drawn: Result<Vec<Picture>, RenderError> = shots.par_iter().map(|shot| shot(&studio)).collect();
+    let drawn: Result<Vec<Picture>, RenderError> =
+        shots.par_iter().map(|shot| shot(&studio)).collect();
     Ok(drawn.map_err(ReportError::from)?)
 }
 
@@ -49,7 +50,9 @@ fn deviation(remeshed: &Remeshed, part: &Part) -> Vec<f64> {
     let field = &remeshed.field;
     let nearest = Bvh::new(remeshed.solid.mesh());
     let signed = |p: &crate::Vec3| {
-        let distance = nearest.nearest(p, f64::INFINITY).map_or(0.0, |hit| hit.distance);
+        let distance = nearest
+            .nearest(p, f64::INFINITY)
+            .map_or(0.0, |hit| hit.distance);
         -distance.copysign(field.sample(p)) / field.spacing
     };
     part.mesh.points.par_iter().map(signed).collect()

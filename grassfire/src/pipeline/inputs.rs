@@ -17,15 +17,25 @@ use crate::voxel::VoxelGrid;
 
 /// The proposal as read and repaired.
 pub(super) enum Proposal {
-    Mesh { mesh: TriMesh, report: RepairReport },
-    Density { grid: VoxelGrid<f32>, report: RepairReport },
+    Mesh {
+        mesh: TriMesh,
+        report: RepairReport,
+    },
+    Density {
+        grid: VoxelGrid<f32>,
+        report: RepairReport,
+    },
 }
 
 impl Proposal {
     /// The `input` block of the report.
     pub(super) fn block(&self) -> InputBlock {
         let (Self::Mesh { report, .. } | Self::Density { report, .. }) = self;
-        let entry = |r: &Repair| RepairEntry { kind: kind_name(r.kind), count: r.count, text: r.text.clone() };
+        let entry = |r: &Repair| RepairEntry {
+            kind: kind_name(r.kind),
+            count: r.count,
+            text: r.text.clone(),
+        };
         InputBlock {
             triangles: report.triangles,
             volume: report.volume,
@@ -44,12 +54,20 @@ pub(super) fn proposal(job: &ReconstructJob, monitor: &Monitor) -> Result<Propos
         Input::Mesh { mesh, notes } => {
             let mut repaired = repair(mesh, &options.repair, monitor)?;
             repaired.report.repairs.splice(0..0, notes);
-            Ok(Proposal::Mesh { mesh: repaired.mesh, report: repaired.report })
+            Ok(Proposal::Mesh {
+                mesh: repaired.mesh,
+                report: repaired.report,
+            })
         }
         Input::Density { grid, notes } => {
             let cell = grid.spacing.powi(3);
             let volume = grid.values.iter().map(|v| f64::from(*v)).sum::<f64>() * cell;
-            let report = RepairReport { volume, components: 1, repairs: notes, ..RepairReport::default() };
+            let report = RepairReport {
+                volume,
+                components: 1,
+                repairs: notes,
+                ..RepairReport::default()
+            };
             Ok(Proposal::Density { grid, report })
         }
         Input::Step(path) => Err(StageError::StepProposal { path }),
@@ -57,8 +75,13 @@ pub(super) fn proposal(job: &ReconstructJob, monitor: &Monitor) -> Result<Propos
 }
 
 /// Reads the skeleton that the user drew, when there is one.
-pub(super) fn skeleton(job: &ReconstructJob, monitor: &Monitor) -> Result<Option<Skeleton>, StageError> {
-    let Some(path) = &job.skeleton else { return Ok(None) };
+pub(super) fn skeleton(
+    job: &ReconstructJob,
+    monitor: &Monitor,
+) -> Result<Option<Skeleton>, StageError> {
+    let Some(path) = &job.skeleton else {
+        return Ok(None);
+    };
     let drawn = io::read_skeleton(path, &job.options.read, monitor)?;
     skeleton::check(&drawn)?;
     Ok(Some(drawn))
@@ -72,27 +95,48 @@ pub(super) fn remesh(
     monitor: &Monitor,
 ) -> Result<Remeshed, StageError> {
     let mut remesh_options = options.remesh.clone();
-    remesh_options.keep_open.extend(bodies.bores.iter().copied());
+    remesh_options
+        .keep_open
+        .extend(bodies.bores.iter().copied());
     Ok(match proposal {
         Proposal::Mesh { mesh, .. } => crate::remesh::remesh(mesh, &remesh_options, monitor)?,
-        Proposal::Density { grid, .. } => remesh_density(grid, options.read.threshold, &remesh_options, monitor)?,
+        Proposal::Density { grid, .. } => {
+            remesh_density(grid, options.read.threshold, &remesh_options, monitor)?
+        }
     })
 }
 
 /// Name and SHA-256 of every file that a run reads.
-pub(super) fn fingerprints(job: &ReconstructJob, monitor: &Monitor) -> Result<Vec<InputFile>, StageError> {
-    let paths = std::iter::once(&job.part).chain(&job.non_design).chain(&job.skeleton);
+pub(super) fn fingerprints(
+    job: &ReconstructJob,
+    monitor: &Monitor,
+) -> Result<Vec<InputFile>, StageError> {
+    let paths = std::iter::once(&job.part)
+        .chain(&job.non_design)
+        .chain(&job.skeleton);
     paths.map(|path| fingerprint(path, monitor)).collect()
 }
 
 fn fingerprint(path: &Path, monitor: &Monitor) -> Result<InputFile, StageError> {
     monitor.check()?;
-    let bytes = std::fs::read(path).map_err(|source| IoError::Open { file: path.display().to_string(), source })?;
-    let sha256 = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
-    Ok(InputFile { path: path.display().to_string(), sha256 })
+    let bytes = std::fs::read(path).map_err(|source| IoError::Open {
+        file: path.display().to_string(),
+        source,
+    })?;
+    let sha256 = Sha256::digest(&bytes)
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
+    Ok(InputFile {
+        path: path.display().to_string(),
+        sha256,
+    })
 }
 
 /// The kind as it stands in `report.json`.
 fn kind_name(kind: RepairKind) -> String {
-    serde_json::to_value(kind).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
+    serde_json::to_value(kind)
+        .ok()
+        .and_then(|v| v.as_str().map(str::to_owned))
+        .unwrap_or_default()
 }

@@ -8,7 +8,8 @@ use crate::mesh::{Distance, DistanceOptions, two_sided};
 use crate::monitor::{Cancelled, Monitor};
 use crate::remesh::Remeshed;
 use crate::report::{
-    BodyBlock, CornerDeviation, DistanceBlock, RadiusRange, RemeshBlock, SkeletonBlock, TopologyBlock, VolumeBlock,
+    BodyBlock, CornerDeviation, DistanceBlock, RadiusRange, RemeshBlock, SkeletonBlock,
+    TopologyBlock, VolumeBlock,
 };
 use crate::topology::SurfaceTopology;
 
@@ -56,8 +57,16 @@ pub(super) fn skeleton_block(axis: &MedialAxis, shape: &Shape) -> SkeletonBlock 
         rims: stats.rims,
         spheres: axis.mesh.points.len(),
         regular_fraction: stats.regular_fraction,
-        corner_deviation: CornerDeviation { mean: corners.mean, p95: corners.p95, max: corners.max },
-        radius: RadiusRange { min: stats.radius.min, median: stats.radius.median, max: stats.radius.max },
+        corner_deviation: CornerDeviation {
+            mean: corners.mean,
+            p95: corners.p95,
+            max: corners.max,
+        },
+        radius: RadiusRange {
+            min: stats.radius.min,
+            median: stats.radius.median,
+            max: stats.radius.max,
+        },
     }
 }
 
@@ -72,18 +81,37 @@ pub(super) fn body_block(shape: &Shape) -> BodyBlock {
         extraordinary: valence.iter().filter(|n| **n != 4 && **n != 0).count(),
         self_intersections: shape.fitted.self_intersections.len(),
         folds: super::shape::flipped(&shape.fitted),
-        construction: if shape.wrapped { "wrapped" } else { "thickened" }.to_owned(),
+        construction: if shape.wrapped {
+            "wrapped"
+        } else {
+            "thickened"
+        }
+        .to_owned(),
     }
 }
 
 /// Distance between the part and the remeshed proposal, both ways, away from the non-design region.
-pub(super) fn deviation(remeshed: &Remeshed, part: &Part, bodies: &Bodies, monitor: &Monitor) -> Result<Distance, Cancelled> {
+pub(super) fn deviation(
+    remeshed: &Remeshed,
+    part: &Part,
+    bodies: &Bodies,
+    monitor: &Monitor,
+) -> Result<Distance, Cancelled> {
     monitor.step("measure", "distance to the proposal", 0.0)?;
     let voxel = remeshed.field.spacing;
     let region = bodies.region(REGION_MARGIN * voxel);
     let ignore = |p: &crate::Vec3| region.contains(p);
-    let distance = two_sided(&part.mesh, remeshed.solid.mesh(), &DistanceOptions::default(), Some(&ignore));
-    for (place, mm) in distance.worst.iter().filter(|(_, mm)| *mm > WORTH_NAMING * voxel) {
+    let distance = two_sided(
+        &part.mesh,
+        remeshed.solid.mesh(),
+        &DistanceOptions::default(),
+        Some(&ignore),
+    );
+    for (place, mm) in distance
+        .worst
+        .iter()
+        .filter(|(_, mm)| *mm > WORTH_NAMING * voxel)
+    {
         monitor.warn(
             "measure",
             format!(
@@ -98,7 +126,11 @@ pub(super) fn deviation(remeshed: &Remeshed, part: &Part, bodies: &Bodies, monit
     Ok(distance)
 }
 
-pub(super) fn distance_block(distance: &Distance, remeshed: &Remeshed, part: &Part) -> DistanceBlock {
+pub(super) fn distance_block(
+    distance: &Distance,
+    remeshed: &Remeshed,
+    part: &Part,
+) -> DistanceBlock {
     DistanceBlock {
         rms: distance.rms,
         p95: distance.p95,
@@ -110,5 +142,9 @@ pub(super) fn distance_block(distance: &Distance, remeshed: &Remeshed, part: &Pa
 
 pub(super) fn volume_block(remeshed: &Remeshed, part: &Part) -> VolumeBlock {
     let proposal = remeshed.solid.volume();
-    VolumeBlock { proposal, solid: part.volume, relative_difference: (part.volume - proposal) / proposal }
+    VolumeBlock {
+        proposal,
+        solid: part.volume,
+        relative_difference: (part.volume - proposal) / proposal,
+    }
 }

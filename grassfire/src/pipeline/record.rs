@@ -23,20 +23,37 @@ impl Record {
 
     /// Runs one stage, notes its seconds and the process's peak memory, and names the stage in its error.
     /// A stage that runs again (a retry) adds to its entry.
-    pub(super) fn stage<T, E>(&mut self, name: &'static str, run: impl FnOnce() -> Result<T, E>) -> Result<T, PipelineError>
+    pub(super) fn stage<T, E>(
+        &mut self,
+        name: &'static str,
+        run: impl FnOnce() -> Result<T, E>,
+    ) -> Result<T, PipelineError>
     where
         StageError: From<E>,
     {
         let start = Instant::now();
-        let result = run().map_err(|source| PipelineError { stage: name, source: source.into() });
+        let result = run().map_err(|source| PipelineError {
+            stage: name,
+            source: source.into(),
+        });
         let seconds = start.elapsed().as_secs_f64();
         let peak_memory = peak_memory();
-        match self.report.stages.iter_mut().find(|entry| entry.name == name) {
+        match self
+            .report
+            .stages
+            .iter_mut()
+            .find(|entry| entry.name == name)
+        {
             Some(entry) => {
                 entry.seconds += seconds;
                 entry.peak_memory = peak_memory;
             }
-            None => self.report.stages.push(StageEntry { name: name.to_owned(), seconds, peak_memory, cached: false }),
+            None => self.report.stages.push(StageEntry {
+                name: name.to_owned(),
+                seconds,
+                peak_memory,
+                cached: false,
+            }),
         }
         result
     }
@@ -44,10 +61,23 @@ impl Record {
     /// Adds warnings, papers and verdicts; gives the checks that were not met, one line each.
     pub(super) fn finish(&mut self, limits: &Limits, monitor: &Monitor) -> Vec<String> {
         self.report.warnings = monitor.warnings();
-        let stages: Vec<&str> = self.report.stages.iter().map(|stage| stage.name.as_str()).collect();
-        self.report.papers = papers::of_stages(stages).iter().map(|paper| paper.key.to_owned()).collect();
+        let stages: Vec<&str> = self
+            .report
+            .stages
+            .iter()
+            .map(|stage| stage.name.as_str())
+            .collect();
+        self.report.papers = papers::of_stages(stages)
+            .iter()
+            .map(|paper| paper.key.to_owned())
+            .collect();
         self.report.checks = judge(&self.report, limits);
-        self.report.checks.iter().filter(|check| !check.met).map(line).collect()
+        self.report
+            .checks
+            .iter()
+            .filter(|check| !check.met)
+            .map(line)
+            .collect()
     }
 }
 
@@ -55,11 +85,18 @@ impl Record {
 fn peak_memory() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let kilobytes = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    kilobytes.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok()).map_or(0.0, |kb| kb / 1024.0)
+    kilobytes
+        .and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok())
+        .map_or(0.0, |kb| kb / 1024.0)
 }
 
 /// One verdict as a line of text.
 fn line(check: &Check) -> String {
-    let value = check.value.map_or_else(|| "not measured".to_owned(), |v| format!("{v:.4}"));
-    format!("{}: {} {} (limit {} {}), {}", check.name, value, check.unit, check.limit, check.unit, check.text)
+    let value = check
+        .value
+        .map_or_else(|| "not measured".to_owned(), |v| format!("{v:.4}"));
+    format!(
+        "{}: {} {} (limit {} {}), {}",
+        check.name, value, check.unit, check.limit, check.unit, check.text
+    )
 }

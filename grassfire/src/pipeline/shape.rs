@@ -29,7 +29,9 @@ pub struct RetryOptions {
 
 impl Default for RetryOptions {
     fn default() -> Self {
-        Self { quad_sizes: vec![1.0, 0.75, 0.55, 1.3] }
+        Self {
+            quad_sizes: vec![1.0, 0.75, 0.55, 1.3],
+        }
     }
 }
 
@@ -58,20 +60,31 @@ pub(super) fn shape(
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Shape, PipelineError> {
-    let sizes: &[f64] = if drawn.is_some() { &[1.0] } else { &options.retry.quad_sizes };
+    let sizes: &[f64] = if drawn.is_some() {
+        &[1.0]
+    } else {
+        &options.retry.quad_sizes
+    };
     let mut best: Option<(Score, Shape)> = None;
     let mut failure = None;
     for (attempt, &size) in sizes.iter().enumerate() {
         let name = format!("try {} (quad size x {size})", attempt + 1);
         match one_shape(record, axis, remeshed, drawn, size, options, monitor) {
             Ok(shape) => {
-                let score = Score::of(&shape.fitted, remeshed.field.spacing, &options.report.limits);
+                let score = Score::of(
+                    &shape.fitted,
+                    remeshed.field.spacing,
+                    &options.report.limits,
+                );
                 if score.good() {
                     return Ok(shape);
                 }
                 monitor.warn("fit", format!("{name}: {score}"));
                 let hopeless = score.hopeless();
-                if best.as_ref().is_none_or(|(least, _)| score.worse() < least.worse()) {
+                if best
+                    .as_ref()
+                    .is_none_or(|(least, _)| score.worse() < least.worse())
+                {
                     best = Some((score, shape));
                 }
                 if hopeless {
@@ -88,7 +101,8 @@ pub(super) fn shape(
     if drawn.is_none() {
         let wrapped = wrapped(record, axis, remeshed, options, monitor)?;
         if let Some((score, shape)) = wrapped.filter(|(score, _)| {
-            best.as_ref().is_none_or(|(least, _)| score.worse() < least.worse())
+            best.as_ref()
+                .is_none_or(|(least, _)| score.worse() < least.worse())
         }) {
             monitor.warn("thicken", format!("the part is too bulky for its skeleton: its body of {} quads is wrapped around the proposal instead, and editing radii does not move it", shape.body.mesh.quads.len()));
             if !score.good() {
@@ -100,7 +114,10 @@ pub(super) fn shape(
     match (best, failure) {
         (Some((_, shape)), _) => Ok(shape),
         (None, Some(error)) => Err(error),
-        (None, None) => Err(PipelineError { stage: "skeleton", source: StageError::NoQuadSize }),
+        (None, None) => Err(PipelineError {
+            stage: "skeleton",
+            source: StageError::NoQuadSize,
+        }),
     }
 }
 
@@ -114,12 +131,30 @@ fn wrapped(
     monitor: &Monitor,
 ) -> Result<Option<(Score, Shape)>, PipelineError> {
     let skeleton = skeleton_of(record, axis, remeshed, None, 1.0, options, monitor)?;
-    let mesh = record.stage("thicken", || wrap(&remeshed.field, axis.solid, &options.wrap, monitor))?;
+    let mesh = record.stage("thicken", || {
+        wrap(&remeshed.field, axis.solid, &options.wrap, monitor)
+    })?;
     let Some(mesh) = mesh else { return Ok(None) };
     let body = record.stage("thicken", || thicken::adopt(mesh, &skeleton.skeleton))?;
-    let fitted = record.stage("fit", || fit(&body, &skeleton.skeleton, &remeshed.field, &options.fit, monitor))?;
+    let fitted = record.stage("fit", || {
+        fit(
+            &body,
+            &skeleton.skeleton,
+            &remeshed.field,
+            &options.fit,
+            monitor,
+        )
+    })?;
     let score = Score::of(&fitted, remeshed.field.spacing, &options.report.limits);
-    Ok(Some((score, Shape { skeleton, body, fitted, wrapped: true })))
+    Ok(Some((
+        score,
+        Shape {
+            skeleton,
+            body,
+            fitted,
+            wrapped: true,
+        },
+    )))
 }
 
 /// How good a fitted body is.
@@ -143,7 +178,11 @@ impl Score {
         let rms = both.iter().map(|d| d.rms).fold(0.0, f64::max) / (voxel * limits.distance_rms);
         let p95 = both.iter().map(|d| d.p95).fold(0.0, f64::max) / (voxel * limits.distance_p95);
         let volume = (fitted.volume / fitted.iso_volume - 1.0).abs() / limits.volume;
-        Self { crossings: fitted.self_intersections.len(), folds: flipped(fitted), excess: rms.max(p95).max(volume) / MARGIN }
+        Self {
+            crossings: fitted.self_intersections.len(),
+            folds: flipped(fitted),
+            excess: rms.max(p95).max(volume) / MARGIN,
+        }
     }
 
     fn good(&self) -> bool {
@@ -170,7 +209,11 @@ impl std::fmt::Display for Score {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.crossings {
             0 if self.folds > 0 => write!(f, "{} faces of the body fold over", self.folds),
-            0 => write!(f, "the body misses the proposal by {:.2} times the limits for distance and volume", self.excess),
+            0 => write!(
+                f,
+                "the body misses the proposal by {:.2} times the limits for distance and volume",
+                self.excess
+            ),
             places => write!(f, "the body cuts itself at {places} places"),
         }
     }
@@ -186,9 +229,24 @@ fn one_shape(
     monitor: &Monitor,
 ) -> Result<Shape, PipelineError> {
     let skeleton = skeleton_of(record, axis, remeshed, drawn, size, options, monitor)?;
-    let body = record.stage("thicken", || thicken(&skeleton.skeleton, &options.thicken, monitor))?;
-    let fitted = record.stage("fit", || fit(&body, &skeleton.skeleton, &remeshed.field, &options.fit, monitor))?;
-    Ok(Shape { skeleton, body, fitted, wrapped: false })
+    let body = record.stage("thicken", || {
+        thicken(&skeleton.skeleton, &options.thicken, monitor)
+    })?;
+    let fitted = record.stage("fit", || {
+        fit(
+            &body,
+            &skeleton.skeleton,
+            &remeshed.field,
+            &options.fit,
+            monitor,
+        )
+    })?;
+    Ok(Shape {
+        skeleton,
+        body,
+        fitted,
+        wrapped: false,
+    })
 }
 
 /// The quad skeleton at one quad size, or the one drawn elsewhere, with smooth radii.
@@ -219,7 +277,11 @@ fn skeleton_of(
 fn adopt(drawn: &Skeleton, axis: &MedialAxis) -> QuadSkeleton {
     let mut skeleton = drawn.clone();
     radii::map(&axis.mesh, &mut skeleton);
-    QuadSkeleton { topology: skeleton::topology(&skeleton), stats: skeleton::stats(&skeleton), skeleton }
+    QuadSkeleton {
+        topology: skeleton::topology(&skeleton),
+        stats: skeleton::stats(&skeleton),
+        skeleton,
+    }
 }
 
 /// Patches, B-rep and tessellation of a control mesh.
@@ -236,5 +298,9 @@ pub(super) fn surface(
     let mut fine = options.tessellate;
     fine.chord = fine.chord.min(0.1 * voxel);
     let tessellation = tessellate(mesh, &patches, &fine)?;
-    Ok(Surface { g1, brep, tessellation })
+    Ok(Surface {
+        g1,
+        brep,
+        tessellation,
+    })
 }

@@ -188,7 +188,10 @@ pub(super) fn quads(grid: &VoxelGrid<f32>, set: &VoxelSet) -> Option<ControlMesh
     };
     let mut points: Vec<Vec3> = cells.number().iter().map(|v| v.mean).collect();
     let polygons = cells.polygons(&mut points);
-    let quads = polygons.iter().map(|p| p[..].try_into().ok()).collect::<Option<Vec<[u32; 4]>>>()?;
+    let quads = polygons
+        .iter()
+        .map(|p| p[..].try_into().ok())
+        .collect::<Option<Vec<[u32; 4]>>>()?;
     Some(ControlMesh { points, quads })
 }
 

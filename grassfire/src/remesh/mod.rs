@@ -17,8 +17,8 @@ mod resolution;
 mod sample;
 mod signed_distance;
 mod smooth;
-mod wrap;
 mod vanished;
+mod wrap;
 
 pub use error::RemeshError;
 pub use options::{Capsule, RemeshOptions};

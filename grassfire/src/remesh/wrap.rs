@@ -56,7 +56,9 @@ pub fn wrap(
         if set.betti() != wanted {
             continue;
         }
-        if let Some(mesh) = extract::quads(&grid, &set).filter(|m| m.quads.len() <= options.max_quads) {
+        if let Some(mesh) =
+            extract::quads(&grid, &set).filter(|m| m.quads.len() <= options.max_quads)
+        {
             return Ok(Some(mesh));
         }
     }
@@ -69,7 +71,9 @@ fn coarser(field: &VoxelGrid<f32>, size: f64) -> VoxelGrid<f32> {
     let dims = field.dims.map(|n| (n as f64 / size).ceil() as usize + 4);
     // Centred, so that symmetric parts stay symmetric.
     let middle = |n: usize, h: f64| (n as f64 - 1.0) / 2.0 * h;
-    let origin = Vec3::from_fn(|a, _| field.origin[a] + middle(field.dims[a], field.spacing) - middle(dims[a], spacing));
+    let origin = Vec3::from_fn(|a, _| {
+        field.origin[a] + middle(field.dims[a], field.spacing) - middle(dims[a], spacing)
+    });
     let mut grid = VoxelGrid::filled(origin, spacing, dims, -spacing as f32);
     for v in 0..grid.values.len() {
         let [i, j, k] = grid.ijk(v);
@@ -100,16 +104,37 @@ mod tests {
     #[test]
     fn a_ring_is_wrapped_by_a_closed_quad_mesh_of_genus_one() {
         let wanted = Betti::from_chi(1, 0, 0);
-        let mesh = wrap(&torus(), wanted, &WrapOptions::default(), &Monitor::default());
+        let mesh = wrap(
+            &torus(),
+            wanted,
+            &WrapOptions::default(),
+            &Monitor::default(),
+        );
         let mesh = mesh.ok().flatten().expect("a size serves");
-        let triangles = mesh.quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        let solid = Solid::try_from(TriMesh { points: mesh.points, triangles, tags: Vec::new() });
+        let triangles = mesh
+            .quads
+            .iter()
+            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect();
+        let solid = Solid::try_from(TriMesh {
+            points: mesh.points,
+            triangles,
+            tags: Vec::new(),
+        });
         assert_eq!(solid.map(|s| s.euler()), Ok(0));
     }
 
     #[test]
     fn a_topology_that_the_field_does_not_have_gives_nothing() {
         let wanted = Betti::from_chi(1, 0, -4);
-        assert_eq!(wrap(&torus(), wanted, &WrapOptions::default(), &Monitor::default()), Ok(None));
+        assert_eq!(
+            wrap(
+                &torus(),
+                wanted,
+                &WrapOptions::default(),
+                &Monitor::default()
+            ),
+            Ok(None)
+        );
     }
 }

@@ -14,12 +14,25 @@ use crate::spline::ControlMesh;
 pub fn adopt(mesh: ControlMesh, skeleton: &Skeleton) -> Result<ThickenedBody, ThickenError> {
     let grid = PointGrid::new(skeleton.points.clone());
     let nearest = |p: &crate::Vec3| grid.k_nearest(p, 1, |_| true).first().map(|(_, i)| *i);
-    let source: Vec<u32> = mesh.points.iter().map(nearest).collect::<Option<_>>().ok_or(ThickenError::Empty)?;
-    let foot = source.iter().map(|&i| skeleton.points[i as usize]).collect();
+    let source: Vec<u32> = mesh
+        .points
+        .iter()
+        .map(nearest)
+        .collect::<Option<_>>()
+        .ok_or(ThickenError::Empty)?;
+    let foot = source
+        .iter()
+        .map(|&i| skeleton.points[i as usize])
+        .collect();
     let betti = topology(skeleton);
     let chi = euler(&mesh);
     if chi != 2 * betti.chi {
-        return Err(ThickenError::BadTopology { body: 0, place: mesh.points[0], chi, wanted: 2 * betti.chi });
+        return Err(ThickenError::BadTopology {
+            body: 0,
+            place: mesh.points[0],
+            chi,
+            wanted: 2 * betti.chi,
+        });
     }
     let body = BodyTopology {
         skeleton_chi: betti.chi,
@@ -28,7 +41,13 @@ pub fn adopt(mesh: ControlMesh, skeleton: &Skeleton) -> Result<ThickenedBody, Th
         quads: mesh.quads.len() as u32,
         volume: volume(&mesh),
     };
-    Ok(ThickenedBody { mesh, source, foot, bodies: vec![body], rules: RuleCounts::default() })
+    Ok(ThickenedBody {
+        mesh,
+        source,
+        foot,
+        bodies: vec![body],
+        rules: RuleCounts::default(),
+    })
 }
 
 fn euler(mesh: &ControlMesh) -> i64 {
@@ -47,5 +66,8 @@ fn euler(mesh: &ControlMesh) -> i64 {
 fn volume(mesh: &ControlMesh) -> f64 {
     let at = |v: u32| mesh.points[v as usize];
     let tetrahedron = |a: u32, b: u32, c: u32| at(a).dot(&at(b).cross(&at(c))) / 6.0;
-    mesh.quads.iter().map(|&[a, b, c, d]| tetrahedron(a, b, c) + tetrahedron(a, c, d)).sum()
+    mesh.quads
+        .iter()
+        .map(|&[a, b, c, d]| tetrahedron(a, b, c) + tetrahedron(a, c, d))
+        .sum()
 }
