@@ -166,10 +166,11 @@ impl<'a> Solver<'a> {
 
     /// Tangential part of the Laplacian; the first samples are those of the control points.
     fn add_evenness(&mut self, normals: &[Vec3], mean_area: f64) {
-        for r in 0..self.surface.coarse.point_count {
+        let control = normals.iter().zip(&self.fairness);
+        for (r, (normal, fairness)) in control.enumerate().take(self.surface.coarse.point_count) {
             // Local fairness asks for a calmer net, too.
-            let weight = self.options.evenness * mean_area * self.fairness[r].min(20.0);
-            let block = weight * (Matrix3::identity() - normals[r] * normals[r].transpose());
+            let weight = self.options.evenness * mean_area * fairness.min(20.0);
+            let block = weight * (Matrix3::identity() - normal * normal.transpose());
             let (indices, weights) = self.surface.laplacian.row(r);
             self.equations.add(indices, weights, &block, &Vec3::zeros());
         }

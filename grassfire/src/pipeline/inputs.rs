@@ -8,7 +8,7 @@ use super::bodies::Bodies;
 use super::error::StageError;
 use super::{ReconstructJob, ReconstructOptions};
 use crate::io::{self, Input, IoError};
-use crate::mesh::{Repair, RepairKind, RepairReport, TriMesh, repair};
+use crate::mesh::{Repair, RepairKind, RepairReport, Repaired, TriMesh, repair};
 use crate::monitor::Monitor;
 use crate::remesh::{Remeshed, remesh_density};
 use crate::report::{InputBlock, InputFile, RepairEntry};
@@ -53,7 +53,11 @@ pub(super) fn proposal(job: &ReconstructJob, monitor: &Monitor) -> Result<Propos
     match io::read_input(&job.part, &options.read, monitor)? {
         Input::Mesh { mesh, notes } => {
             let mut repaired = repair(mesh, &options.repair, monitor)?;
+            for note in notes.iter().filter(|note| note.kind.is_warning()) {
+                monitor.warn("read", note.text.clone());
+            }
             repaired.report.repairs.splice(0..0, notes);
+            enlarge(&mut repaired, monitor);
             Ok(Proposal::Mesh {
                 mesh: repaired.mesh,
                 report: repaired.report,
@@ -72,6 +76,34 @@ pub(super) fn proposal(job: &ReconstructJob, monitor: &Monitor) -> Result<Propos
         }
         Input::Step(path) => Err(StageError::StepProposal { path }),
     }
+}
+
+/// CAD kernels do not tell points apart that are nearer than 1e-7 mm: no part shorter than this can be built, mm.
+const TOO_SMALL: f64 = 0.01;
+
+/// Enlarges a part that no CAD kernel could hold by a power of ten, to some 100 mm: its file was written in another
+/// unit. The report and a warning say so.
+fn enlarge(repaired: &mut Repaired, monitor: &Monitor) {
+    let Some((lo, hi)) = repaired.mesh.bounds() else {
+        return;
+    };
+    let size = (hi - lo).norm();
+    if size >= TOO_SMALL || size <= 0.0 {
+        return;
+    }
+    let factor = 10_f64.powf((100.0 / size).log10().ceil());
+    for point in &mut repaired.mesh.points {
+        *point *= factor;
+    }
+    repaired.report.volume *= factor.powi(3);
+    let text = format!(
+        "the part is only {size:.3e} mm across, below what a CAD kernel resolves: it was enlarged {factor:e} times; give its unit with --set read.scale=MM_PER_UNIT"
+    );
+    monitor.warn("read", text.clone());
+    repaired
+        .report
+        .repairs
+        .push(Repair::new(RepairKind::Scale, 1, text));
 }
 
 /// Reads the skeleton that the user drew, when there is one.
