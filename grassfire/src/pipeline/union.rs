@@ -27,6 +27,7 @@ pub(super) struct Part {
 }
 
 /// Chord of the part's triangles, voxels: well below what any figure of the report resolves.
+#[cfg(feature = "occt")]
 const CHORD: f64 = 0.05;
 
 /// Builds the CAD solid, unites it with the non-design bodies and checks it. `intersections` is how often the fitted
@@ -115,9 +116,10 @@ pub(super) fn part(
     _options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Part, StageError> {
+    let kink = surface.g1.max_angle_deg;
     monitor.warn(
         "cad",
-        "this build has no OpenCASCADE: body.obj, body.stl and part.stl are written, no STEP",
+        format!("this build has no OpenCASCADE: body.obj, body.stl and part.stl are written (largest kink {kink:.1e} degrees), no STEP"),
     );
     let mesh = TriMesh {
         tags: Vec::new(),
