@@ -87,18 +87,18 @@ fn reconstruct_help_is_complete() {
 
     Options:
           --non-design <FILE>  Body that must be in the solid as given (STEP or STL); may be repeated
-          --skeleton <FILE>      Quad skeleton to use instead of our own (PLY or OBJ)
-          --voxel <MM>           Edge of a voxel, mm (remesh.voxel)
-          --quad-size <MM>       Edge of a skeleton quad, mm (skeleton.quad_size)
-          --iso <VALUE>          Density at which material begins (read.threshold)
-          --strict               Refuse a mesh that needs repair (repair.strict)
-      -o, --output <DIR>         Folder for the results; made when missing
-          --set <KEY=VALUE>      Sets any option, such as remesh.min_tunnel=0; may be repeated
-          --threads <N>          Threads; 0 takes all cores
-          --json                 Print report.json on stdout
-      -q, --quiet                No progress, warnings or summary
-      -v, --verbose              Say when each stage ends and how long it took
-      -h, --help                 Print help
+          --skeleton <FILE>    Quad skeleton to use instead of our own (PLY or OBJ)
+          --voxel <MM>         Edge of a voxel, mm (remesh.voxel)
+          --quad-size <MM>     Edge of a skeleton quad, mm (skeleton.quad_size)
+          --iso <VALUE>        Density at which material begins (read.threshold)
+          --strict             Refuse a mesh that needs repair (repair.strict)
+      -o, --output <DIR>       Folder for the results; made when missing
+          --set <KEY=VALUE>    Sets any option, such as remesh.min_tunnel=0; may be repeated
+          --threads <N>        Threads; 0 takes all cores
+          --json               Print report.json on stdout
+      -q, --quiet              No progress, warnings or summary
+      -v, --verbose            Say when each stage ends and how long it took
+      -h, --help               Print help
 
     Examples:
       grassfire reconstruct part.stl -o out

@@ -30,7 +30,7 @@ pub struct RetryOptions {
 impl Default for RetryOptions {
     fn default() -> Self {
         Self {
-            quad_sizes: vec![1.0, 0.75, 0.55, 1.3],
+            quad_sizes: vec![1.0, 0.8, 1.3],
         }
     }
 }
@@ -65,6 +65,12 @@ pub(super) fn shape(
     } else {
         &options.retry.quad_sizes
     };
+    if sizes.is_empty() {
+        return Err(PipelineError {
+            stage: "skeleton",
+            source: StageError::NoQuadSize,
+        });
+    }
     let mut best: Option<(Score, Shape)> = None;
     let mut failure = None;
     for (attempt, &size) in sizes.iter().enumerate() {
@@ -264,6 +270,8 @@ fn skeleton_of(
         None => {
             let mut sized = options.skeleton.clone();
             sized.size_factor *= size;
+            sized.size_least *= size;
+            sized.size_most *= size;
             sized.quad_size = sized.quad_size.map(|mm| mm * size);
             quad_skeleton(&axis.mesh, remeshed.field.spacing, &sized, monitor)
         }

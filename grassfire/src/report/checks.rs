@@ -73,6 +73,9 @@ pub fn judge(report: &Report, limits: &Limits) -> Vec<Check> {
             0.0,
             DEFECTS,
         ));
+        let folds = body.folds as f64;
+        let text = "No face of the body folds over";
+        checks.push(check("body.folds", text, folds, 0.0, DEFECTS));
     }
     solid(report, limits, &mut checks);
     fidelity(report, limits, &mut checks);
