@@ -29,6 +29,8 @@ pub struct Run {
     pub peak_memory: f64,
     /// How long it took.
     pub seconds: f64,
+    /// How long the processors worked for it, s; 0 where the system does not tell.
+    pub processor_seconds: f64,
 }
 
 impl Run {
@@ -82,9 +84,10 @@ pub fn start(part: &Path, output: &Path, args: &[&str]) -> Child {
 /// Waits for a started run; one that hangs is ended and fails the test.
 pub fn finish(mut child: Child, output: &Path) -> Run {
     let begin = Instant::now();
-    let mut peak_memory: f64 = 0.0;
+    let (mut peak_memory, mut processor_seconds): (f64, f64) = (0.0, 0.0);
     let status = loop {
         peak_memory = peak_memory.max(memory(child.id()));
+        processor_seconds = processor_seconds.max(work(child.id()));
         if let Some(status) = child.try_wait().expect("the program can be waited for") {
             break status;
         }
@@ -103,6 +106,7 @@ pub fn finish(mut child: Child, output: &Path) -> Run {
         output: output.to_owned(),
         peak_memory,
         seconds: begin.elapsed().as_secs_f64(),
+        processor_seconds,
     }
 }
 
@@ -122,6 +126,17 @@ fn memory(process: u32) -> f64 {
         .next()
         .and_then(|kb| kb.parse::<f64>().ok())
         .map_or(0.0, |kb| kb / 1024.0)
+}
+
+/// User and system time of a running process so far, s.
+fn work(process: u32) -> f64 {
+    /// Linux reports in ticks of a hundredth of a second on all its platforms.
+    const TICKS: f64 = 100.0;
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    // The name in brackets may hold blanks; utime and stime are the 12th and 13th fields after it.
+    let fields = stat.rsplit(')').next().unwrap_or_default();
+    let times = fields.split_whitespace().skip(11).take(2);
+    times.filter_map(|t| t.parse::<f64>().ok()).sum::<f64>() / TICKS
 }
 
 /// A square plate with a round hole in its middle, as binary STL: genus 1, `side` and `thick` mm.

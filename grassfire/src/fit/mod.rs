@@ -219,9 +219,9 @@ impl FitError {
 ///    Tangential evenness |Lap X|^2, without its normal part, spreads the control points.
 /// 3. Untangling: where the limit mesh (two splits) intersects itself or a G1 patch folds, fairness
 ///    grows and data counts less until it does not; then rounds with all data give back what that
-///    took, their steps shortened wherever they would create an intersection or deepen a fold. If places are left, or more volume or
-///    accuracy is lost than the options allow, the same is tried from the thin start of the fit,
-///    where little is in the way. Places that stay are reported in [`Fitted::self_intersections`]
+///    took, their steps shortened wherever they would create an intersection or deepen a fold. It is
+///    undone if it costs more volume or accuracy than the options allow. Places that stay are
+///    reported in [`Fitted::self_intersections`]
 ///    and [`Fitted::folds`] and as warnings, never hidden.
 ///
 /// The normal equations are one sparse Cholesky system; its symbolic factorisation is made once.

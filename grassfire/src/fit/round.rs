@@ -181,27 +181,6 @@ impl<'a> Solver<'a> {
         self.options.fold_limit
     }
 
-    /// Makes the net as straight as possible at the control points that are `near`; the others stay.
-    pub fn smooth(&mut self, points: &[Vec3], near: &[bool]) -> Result<Vec<Vec3>, FitError> {
-        let identity = Matrix3::identity();
-        self.equations.clear();
-        for (p, place) in points.iter().enumerate() {
-            if near[p] {
-                let (indices, weights) = self.surface.bending.row(p);
-                self.equations
-                    .add(indices, weights, &identity, &Vec3::zeros());
-                let (indices, weights) = self.surface.laplacian.row(p);
-                self.equations
-                    .add(indices, weights, &(0.02 * identity), &Vec3::zeros());
-            }
-            self.equations
-                .pin(p as u32, if near[p] { 1e-3 } else { 1e6 }, place);
-        }
-        self.equations
-            .solve()
-            .map_err(|reason| FitError::Solver { round: 0, reason })
-    }
-
     /// Distances of the limit surface to f = 0, by flow along the gradient.
     pub fn body_to_iso(&self, points: &[Vec3]) -> Distances {
         let at = self.surface.samples.apply(points);

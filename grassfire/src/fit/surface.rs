@@ -61,15 +61,12 @@ impl Surface {
         })
     }
 
-    /// Control points whose limit surface follows the thickened points, damped towards them.
+    /// Control points whose limit surface follows the thickened points T, damped towards them: least
+    /// squares |L X - T|^2 + 1e-2 |Lap (X - T)|^2 + 1e-6 |X|^2, L the limit positions.
     pub fn damped_start(&self) -> Result<Vec<Vec3>, FitError> {
-        self.damped(&self.thickened)
-    }
-
-    /// Least squares |L X - T|^2 + 1e-2 |Lap (X - T)|^2 + 1e-6 |X|^2, L the limit positions.
-    pub fn damped(&self, targets: &[Vec3]) -> Result<Vec<Vec3>, FitError> {
         const DAMPING: f64 = 1e-2;
         const TINY: f64 = 1e-6;
+        let targets = &self.thickened[..];
         let n = targets.len();
         let limit = self.coarse.limit_positions();
         let bent = self.laplacian.apply(targets);

@@ -51,7 +51,19 @@ pub(super) struct Surface {
     pub(super) tessellation: Tessellation,
 }
 
-/// Skeleton, thickening and fit; the first body that is sound and close enough wins, else the best of all tries.
+/// What every try starts from.
+struct Workshop<'a> {
+    record: &'a mut Record,
+    axis: &'a MedialAxis,
+    remeshed: &'a Remeshed,
+    /// A skeleton drawn elsewhere.
+    drawn: Option<&'a Skeleton>,
+    options: &'a ReconstructOptions,
+    monitor: &'a Monitor,
+}
+
+/// Skeleton, thickening and fit; the first body that is sound and close enough wins, else the best of all tries. When
+/// none is sound, or all are far off, the body is wrapped around the proposal instead.
 pub(super) fn shape(
     record: &mut Record,
     axis: &MedialAxis,
@@ -60,107 +72,143 @@ pub(super) fn shape(
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Shape, PipelineError> {
-    let sizes: &[f64] = if drawn.is_some() {
-        &[1.0]
-    } else {
-        &options.retry.quad_sizes
+    let mut workshop = Workshop {
+        record,
+        axis,
+        remeshed,
+        drawn,
+        options,
+        monitor,
     };
-    if sizes.is_empty() {
-        return Err(PipelineError {
-            stage: "skeleton",
-            source: StageError::NoQuadSize,
-        });
+    let tried = workshop.tries();
+    let finished = match &tried {
+        Ok((score, _)) => score.usable(),
+        Err(error) => error.is_cancelled() || options.retry.quad_sizes.is_empty(),
+    };
+    if finished || drawn.is_some() {
+        return tried.map(|(_, shape)| shape);
     }
-    let mut best: Option<(Score, Shape)> = None;
-    let mut failure = None;
-    for (attempt, &size) in sizes.iter().enumerate() {
-        let name = format!("try {} (quad size x {size})", attempt + 1);
-        match one_shape(record, axis, remeshed, drawn, size, options, monitor) {
-            Ok(shape) => {
-                let score = Score::of(
-                    &shape.fitted,
-                    remeshed.field.spacing,
-                    &options.report.limits,
-                );
-                if score.good() {
-                    return Ok(shape);
-                }
-                monitor.warn("fit", format!("{name}: {score}"));
-                let hopeless = score.hopeless();
-                if best
-                    .as_ref()
-                    .is_none_or(|(least, _)| score.worse() < least.worse())
-                {
-                    best = Some((score, shape));
-                }
-                if hopeless {
-                    break;
-                }
-            }
-            Err(error) if error.is_cancelled() => return Err(error),
-            Err(error) => {
-                monitor.warn(error.stage, format!("{name} failed: {}", error.source));
-                failure = Some(error);
-            }
-        }
-    }
-    if drawn.is_none() {
-        let wrapped = wrapped(record, axis, remeshed, options, monitor)?;
-        if let Some((score, shape)) = wrapped.filter(|(score, _)| {
-            best.as_ref()
-                .is_none_or(|(least, _)| score.worse() < least.worse())
-        }) {
-            monitor.warn("thicken", format!("the part is too bulky for its skeleton: its body of {} quads is wrapped around the proposal instead, and editing radii does not move it", shape.body.mesh.quads.len()));
+    let first = tried.as_ref().ok().map(|(_, shape)| shape.skeleton.clone());
+    if let Some((score, shape)) = workshop.wrapped(first)? {
+        let best = tried.as_ref().ok();
+        if best.is_none_or(|(least, _)| score.worse() < least.worse()) {
+            let quads = shape.body.mesh.quads.len();
+            monitor.warn("thicken", format!("the part is too bulky for its skeleton: its body of {quads} quads is wrapped around the proposal instead, and editing radii does not move it"));
             if !score.good() {
                 monitor.warn("fit", format!("wrapped body: {score}"));
             }
             return Ok(shape);
         }
     }
-    match (best, failure) {
-        (Some((_, shape)), _) => Ok(shape),
-        (None, Some(error)) => Err(error),
-        (None, None) => Err(PipelineError {
-            stage: "skeleton",
-            source: StageError::NoQuadSize,
-        }),
-    }
+    tried.map(|(_, shape)| shape)
 }
 
-/// The last resort for bulky parts: a quad mesh wrapped around the proposal, fitted like a thickened one. The skeleton
-/// is still made and delivered; every point of the body belongs to its nearest skeleton point.
-fn wrapped(
-    record: &mut Record,
-    axis: &MedialAxis,
-    remeshed: &Remeshed,
-    options: &ReconstructOptions,
-    monitor: &Monitor,
-) -> Result<Option<(Score, Shape)>, PipelineError> {
-    let skeleton = skeleton_of(record, axis, remeshed, None, 1.0, options, monitor)?;
-    let mesh = record.stage("thicken", || {
-        wrap(&remeshed.field, axis.solid, &options.wrap, monitor)
-    })?;
-    let Some(mesh) = mesh else { return Ok(None) };
-    let body = record.stage("thicken", || thicken::adopt(mesh, &skeleton.skeleton))?;
-    let fitted = record.stage("fit", || {
-        fit(
-            &body,
-            &skeleton.skeleton,
-            &remeshed.field,
-            &options.fit,
-            monitor,
-        )
-    })?;
-    let score = Score::of(&fitted, remeshed.field.spacing, &options.report.limits);
-    Ok(Some((
-        score,
-        Shape {
+impl Workshop<'_> {
+    /// The first good shape of all quad sizes, else the best.
+    fn tries(&mut self) -> Result<(Score, Shape), PipelineError> {
+        let sizes: &[f64] = if self.drawn.is_some() {
+            &[1.0]
+        } else {
+            &self.options.retry.quad_sizes
+        };
+        let mut best: Result<(Score, Shape), _> = Err(PipelineError {
+            stage: "skeleton",
+            source: StageError::NoQuadSize,
+        });
+        for (attempt, &size) in sizes.iter().enumerate() {
+            let name = format!("try {} (quad size x {size})", attempt + 1);
+            match self.one(size) {
+                Ok((score, shape)) if score.good() => return Ok((score, shape)),
+                Ok((score, shape)) => {
+                    self.monitor.warn("fit", format!("{name}: {score}"));
+                    let hopeless = score.hopeless();
+                    let least = best.as_ref().ok();
+                    if least.is_none_or(|(least, _)| score.worse() < least.worse()) {
+                        best = Ok((score, shape));
+                    }
+                    if hopeless {
+                        break;
+                    }
+                }
+                Err(error) if error.is_cancelled() => return Err(error),
+                Err(error) => {
+                    let text = format!("{name} failed: {}", error.source);
+                    self.monitor.warn(error.stage, text);
+                    best = best.or(Err(error));
+                }
+            }
+        }
+        best
+    }
+
+    fn one(&mut self, size: f64) -> Result<(Score, Shape), PipelineError> {
+        let skeleton = self.skeleton(size)?;
+        let (options, monitor) = (&self.options.thicken, self.monitor);
+        let body = self
+            .record
+            .stage("thicken", || thicken(&skeleton.skeleton, options, monitor))?;
+        self.fitted(skeleton, body, false)
+    }
+
+    /// The last resort for bulky parts: a quad mesh wrapped around the proposal, fitted like a thickened one. The
+    /// skeleton is still delivered; every point of the body belongs to its nearest skeleton point.
+    fn wrapped(
+        &mut self,
+        skeleton: Option<QuadSkeleton>,
+    ) -> Result<Option<(Score, Shape)>, PipelineError> {
+        let skeleton = match skeleton {
+            Some(skeleton) => skeleton,
+            None => self.skeleton(1.0)?,
+        };
+        let (field, solid) = (&self.remeshed.field, self.axis.solid);
+        let (options, monitor) = (&self.options.wrap, self.monitor);
+        let mesh = self
+            .record
+            .stage("thicken", || wrap(field, solid, options, monitor))?;
+        let Some(mesh) = mesh else { return Ok(None) };
+        let body = self
+            .record
+            .stage("thicken", || thicken::adopt(mesh, &skeleton.skeleton))?;
+        self.fitted(skeleton, body, true).map(Some)
+    }
+
+    fn fitted(
+        &mut self,
+        skeleton: QuadSkeleton,
+        body: ThickenedBody,
+        wrapped: bool,
+    ) -> Result<(Score, Shape), PipelineError> {
+        let (field, options) = (&self.remeshed.field, &self.options.fit);
+        let fitted = self.record.stage("fit", || {
+            fit(&body, &skeleton.skeleton, field, options, self.monitor)
+        })?;
+        let score = Score::of(&fitted, field.spacing, &self.options.report.limits);
+        let shape = Shape {
             skeleton,
             body,
             fitted,
-            wrapped: true,
-        },
-    )))
+            wrapped,
+        };
+        Ok((score, shape))
+    }
+
+    /// The quad skeleton at one quad size, or the one drawn elsewhere, with smooth radii.
+    fn skeleton(&mut self, size: f64) -> Result<QuadSkeleton, PipelineError> {
+        let mut sized = self.options.skeleton.clone();
+        sized.size_factor *= size;
+        sized.size_least *= size;
+        sized.size_most *= size;
+        sized.quad_size = sized.quad_size.map(|mm| mm * size);
+        let (axis, voxel) = (self.axis, self.remeshed.field.spacing);
+        let (drawn, monitor) = (self.drawn, self.monitor);
+        let mut skeleton = self.record.stage("skeleton", || match drawn {
+            Some(drawn) => Ok(adopt(drawn, axis)),
+            None => quad_skeleton(&axis.mesh, voxel, &sized, monitor),
+        })?;
+        radii::smooth(&mut skeleton.skeleton, self.options.radii.smoothing);
+        skeleton.stats = skeleton::stats(&skeleton.skeleton);
+        Ok(skeleton)
+    }
 }
 
 /// How good a fitted body is.
@@ -177,6 +225,8 @@ struct Score {
 const MARGIN: f64 = 0.95;
 /// Bodies that miss a limit by more than this factor and cut themselves are given up.
 const HOPELESS: f64 = 3.0;
+/// Sound bodies that miss a limit by up to this factor are kept: they can be edited, wrapped ones cannot.
+const USABLE: f64 = 1.5;
 
 impl Score {
     fn of(fitted: &Fitted, voxel: f64, limits: &Limits) -> Self {
@@ -193,6 +243,11 @@ impl Score {
 
     fn good(&self) -> bool {
         self.crossings + self.folds == 0 && self.excess <= 1.0
+    }
+
+    /// Sound, and not so far off that a body without a skeleton would serve better.
+    fn usable(&self) -> bool {
+        self.crossings + self.folds == 0 && self.excess <= USABLE
     }
 
     /// So far off that other quad sizes do not help: the part is not made of sheets and members.
@@ -223,62 +278,6 @@ impl std::fmt::Display for Score {
             places => write!(f, "the body cuts itself at {places} places"),
         }
     }
-}
-
-fn one_shape(
-    record: &mut Record,
-    axis: &MedialAxis,
-    remeshed: &Remeshed,
-    drawn: Option<&Skeleton>,
-    size: f64,
-    options: &ReconstructOptions,
-    monitor: &Monitor,
-) -> Result<Shape, PipelineError> {
-    let skeleton = skeleton_of(record, axis, remeshed, drawn, size, options, monitor)?;
-    let body = record.stage("thicken", || {
-        thicken(&skeleton.skeleton, &options.thicken, monitor)
-    })?;
-    let fitted = record.stage("fit", || {
-        fit(
-            &body,
-            &skeleton.skeleton,
-            &remeshed.field,
-            &options.fit,
-            monitor,
-        )
-    })?;
-    Ok(Shape {
-        skeleton,
-        body,
-        fitted,
-        wrapped: false,
-    })
-}
-
-/// The quad skeleton at one quad size, or the one drawn elsewhere, with smooth radii.
-fn skeleton_of(
-    record: &mut Record,
-    axis: &MedialAxis,
-    remeshed: &Remeshed,
-    drawn: Option<&Skeleton>,
-    size: f64,
-    options: &ReconstructOptions,
-    monitor: &Monitor,
-) -> Result<QuadSkeleton, PipelineError> {
-    let mut skeleton = record.stage("skeleton", || match drawn {
-        Some(drawn) => Ok(adopt(drawn, axis)),
-        None => {
-            let mut sized = options.skeleton.clone();
-            sized.size_factor *= size;
-            sized.size_least *= size;
-            sized.size_most *= size;
-            sized.quad_size = sized.quad_size.map(|mm| mm * size);
-            quad_skeleton(&axis.mesh, remeshed.field.spacing, &sized, monitor)
-        }
-    })?;
-    radii::smooth(&mut skeleton.skeleton, options.radii.smoothing);
-    skeleton.stats = skeleton::stats(&skeleton.skeleton);
-    Ok(skeleton)
 }
 
 /// Takes a skeleton drawn elsewhere; radii that it does not have come from the medial axis.
