@@ -1,5 +1,6 @@
 //! Voxel remesh: soup in, closed solid and signed distance field out, topological noise removed.
 
+mod bridges;
 mod closing;
 mod compose;
 mod crossings;
@@ -13,10 +14,12 @@ mod islands;
 mod noise;
 mod options;
 mod patch;
+mod residue;
 mod resolution;
 mod sample;
 mod signed_distance;
 mod smooth;
+mod tunnels;
 mod vanished;
 mod wrap;
 
