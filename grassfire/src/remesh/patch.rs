@@ -21,6 +21,8 @@ const RIM: usize = 2;
 const THINNEST: usize = 10;
 /// Radius of the neighbourhood that a membrane is flattened over, voxels.
 const FLAT: usize = 3;
+/// Fewer voxels around a place than this have no plane worth the name.
+const FEW: usize = 9;
 /// Steps from the rim to the middle of a wall at most, and the least rise of the distance on the way (per distance).
 const CLIMB: usize = 64;
 const STEEP: f32 = 0.5;
@@ -208,7 +210,7 @@ fn flattened(grid: &VoxelGrid<f32>, patch: &Patch) -> Vec<Vec3> {
         let eigen = spread.symmetric_eigen();
         let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin());
         let place = centre(v);
-        if near.len() < 5 {
+        if near.len() < FEW {
             return place;
         }
         place - normal * normal.dot(&(place - mean))
