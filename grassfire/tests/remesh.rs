@@ -125,12 +125,9 @@ fn pinholes_of_a_proposal_close_and_windows_stay() {
         return;
     };
     let out = run(&mesh);
-    assert!(
-        out.genus_before == 33 && (3..=9).contains(&out.genus_after),
-        "{} -> {}",
-        out.genus_before,
-        out.genus_after
-    );
+    // By persistent homology of the distance (GUDHI) 7 tunnels are wider than the limit, 6.2 to 23.6 mm, and all others
+    // narrower than 5 mm.
+    assert_eq!((out.genus_before, out.genus_after), (33, 7));
     assert!(
         out.changes
             .iter()
@@ -148,6 +145,22 @@ fn pinholes_of_a_proposal_close_and_windows_stay() {
         );
     }
     assert!((out.solid.volume() / mesh.volume() - 1.0).abs() < 0.03);
+}
+
+#[test]
+fn the_voxel_does_not_decide_which_tunnels_close() {
+    // A pinhole beside a slit stayed open at 0.79 and 0.71 mm (genus 9) and was closed at 0.87 mm (genus 7).
+    let Some(mesh) = load("wishbone/free23_2mm.stl") else {
+        return;
+    };
+    for voxel in [0.715, 0.873] {
+        let options = RemeshOptions {
+            voxel: Some(voxel),
+            ..RemeshOptions::default()
+        };
+        let out = remesh(&mesh, &options, &Monitor::default()).expect("a solid");
+        assert_eq!(out.genus_after, 7, "voxel {voxel} mm");
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! NPY: one NumPy array, taken as densities with axes z, y, x.
 
+use super::number::Number;
 use super::source::{Source, parse, quote};
 use super::{IoError, density};
 use crate::Vec3;
@@ -134,7 +135,6 @@ fn tuple(rest: &[u8]) -> Option<Vec<usize>> {
 fn decode(src: &Source, header: &Header, count: usize) -> Result<Vec<f32>, IoError> {
     let body = src.bytes.get(header.body..).unwrap_or_default();
     let (order, kind) = header.descr.split_at_checked(1).unwrap_or_default();
-    let big = order == ">";
     let unknown = || {
         src.byte(
             header.body,
@@ -144,18 +144,10 @@ fn decode(src: &Source, header: &Header, count: usize) -> Result<Vec<f32>, IoErr
             ),
         )
     };
-    if !"f4 f8 b1 u1 i1 u2 i2 u4 i4 u8 i8"
-        .split(' ')
-        .any(|known| known == kind)
-    {
-        return Err(unknown());
-    }
-    let size: usize = kind
-        .get(1..)
-        .and_then(|s| s.parse().ok())
+    let number = number(kind)
         .filter(|_| "<>|=".contains(order))
         .ok_or_else(unknown)?;
-    let need = count.saturating_mul(size);
+    let need = count.saturating_mul(number.size());
     if need > body.len() {
         let what = format!(
             "shape {:?} of {} needs {need} bytes, the file holds {}",
@@ -165,34 +157,24 @@ fn decode(src: &Source, header: &Header, count: usize) -> Result<Vec<f32>, IoErr
         );
         return Err(src.byte(src.bytes.len(), what));
     }
-    let body = &body[..need];
-    macro_rules! values {
-        ($kind:ty) => {
-            body.chunks_exact(size_of::<$kind>())
-                .map(|b| {
-                    let mut raw = [0u8; size_of::<$kind>()];
-                    raw.copy_from_slice(b);
-                    (if big {
-                        <$kind>::from_be_bytes(raw)
-                    } else {
-                        <$kind>::from_le_bytes(raw)
-                    }) as f32
-                })
-                .collect()
-        };
-    }
-    Ok(match kind {
-        "f4" => values!(f32),
-        "f8" => values!(f64),
-        "b1" | "u1" => values!(u8),
-        "i1" => values!(i8),
-        "u2" => values!(u16),
-        "i2" => values!(i16),
-        "u4" => values!(u32),
-        "i4" => values!(i32),
-        "u8" => values!(u64),
-        "i8" => values!(i64),
-        _ => return Err(unknown()),
+    let values = number.decode_all(&body[..need], order == ">");
+    Ok(values.map(|value| value as f32).collect())
+}
+
+/// The type of a name such as `f4`.
+fn number(kind: &str) -> Option<Number> {
+    Some(match kind {
+        "f4" => Number::F32,
+        "f8" => Number::F64,
+        "b1" | "u1" => Number::U8,
+        "i1" => Number::I8,
+        "u2" => Number::U16,
+        "i2" => Number::I16,
+        "u4" => Number::U32,
+        "i4" => Number::I32,
+        "u8" => Number::U64,
+        "i8" => Number::I64,
+        _ => return None,
     })
 }
 

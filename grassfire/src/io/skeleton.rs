@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::obj::parse_obj;
-use super::ply::{corner_indices, points, read_tables};
+use super::ply::{corner_indices, points};
+use super::ply_table::read_tables;
 use super::source::{Source, find};
 use super::{IoError, ReadOptions, atomic_write, read_file};
 use crate::monitor::Monitor;

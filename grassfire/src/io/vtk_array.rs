@@ -7,6 +7,7 @@ use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 
 use super::IoError;
+use super::number::Number;
 use super::source::{Source, find, quote, tokens};
 
 /// How all arrays of a file are encoded.
@@ -142,35 +143,20 @@ impl Array<'_> {
     }
 
     fn numbers(&self, bytes: &[u8], big: bool) -> Result<Vec<f64>, String> {
-        macro_rules! values {
-            ($kind:ty) => {
-                bytes
-                    .chunks_exact(size_of::<$kind>())
-                    .map(|b| {
-                        let mut raw = [0u8; size_of::<$kind>()];
-                        raw.copy_from_slice(b);
-                        (if big {
-                            <$kind>::from_be_bytes(raw)
-                        } else {
-                            <$kind>::from_le_bytes(raw)
-                        }) as f64
-                    })
-                    .collect()
-            };
-        }
-        Ok(match self.kind.as_str() {
-            "Int8" => values!(i8),
-            "UInt8" => values!(u8),
-            "Int16" => values!(i16),
-            "UInt16" => values!(u16),
-            "Int32" => values!(i32),
-            "UInt32" => values!(u32),
-            "Int64" => values!(i64),
-            "UInt64" => values!(u64),
-            "Float32" => values!(f32),
-            "Float64" => values!(f64),
+        let number = match self.kind.as_str() {
+            "Int8" => Number::I8,
+            "UInt8" => Number::U8,
+            "Int16" => Number::I16,
+            "UInt16" => Number::U16,
+            "Int32" => Number::I32,
+            "UInt32" => Number::U32,
+            "Int64" => Number::I64,
+            "UInt64" => Number::U64,
+            "Float32" => Number::F32,
+            "Float64" => Number::F64,
             other => return Err(format!("type {} is not known", quote(other.as_bytes()))),
-        })
+        };
+        Ok(number.decode_all(bytes, big).collect())
     }
 }
 

@@ -1,8 +1,11 @@
 //! Voxel remesh: soup in, closed solid and signed distance field out, topological noise removed.
 
+mod bridges;
+mod cases;
 mod closing;
 mod compose;
 mod crossings;
+mod density;
 mod deviation;
 mod digital;
 mod error;
@@ -13,10 +16,12 @@ mod islands;
 mod noise;
 mod options;
 mod patch;
+mod residue;
 mod resolution;
 mod sample;
 mod signed_distance;
 mod smooth;
+mod tunnels;
 mod vanished;
 mod wrap;
 
@@ -119,7 +124,7 @@ pub fn remesh_density(
     monitor: &Monitor,
 ) -> Result<Remeshed, RemeshError> {
     check(options)?;
-    let mut padded = padded(density, iso, options, monitor)?;
+    let mut padded = density::padded(density, iso, options, monitor)?;
     let mut set = VoxelSet::positive(padded.dims, &padded.values);
     compose::separate_opposite_empties(&mut padded, &mut set);
     let mesh = usable(&extract::surface(&padded, &set, false).mesh)?;
@@ -183,59 +188,6 @@ fn usable(mesh: &TriMesh) -> Result<TriMesh, RemeshError> {
     } else {
         Ok(mesh)
     }
-}
-
-fn padded(
-    density: &VoxelGrid<f32>,
-    iso: f64,
-    options: &RemeshOptions,
-    monitor: &Monitor,
-) -> Result<VoxelGrid<f32>, RemeshError> {
-    let (dims, spacing) = (density.dims, density.spacing);
-    let wanted = dims.iter().map(|&n| n as f64 + 4.0).product::<f64>();
-    let fits = dims.iter().try_fold(1usize, |n, &d| n.checked_mul(d)) == Some(density.values.len());
-    if !fits || dims.iter().any(|&n| n < 2) || !(spacing.is_finite() && spacing > 0.0) {
-        return Err(RemeshError::BadGrid {
-            dims,
-            values: density.values.len(),
-            spacing,
-        });
-    }
-    if wanted > options.max_voxels as f64 {
-        let finest = spacing * (wanted / options.max_voxels.max(1) as f64).cbrt();
-        return Err(RemeshError::TooManyVoxels {
-            voxel: spacing,
-            wanted,
-            limit: options.max_voxels,
-            finest,
-        });
-    }
-    let finite = density.values.iter().filter(|v| v.is_finite());
-    let highest = finite
-        .clone()
-        .fold(f64::NEG_INFINITY, |m, &v| m.max(f64::from(v)));
-    if iso.is_nan() || highest <= iso {
-        return Err(RemeshError::NoMaterial { highest, iso });
-    }
-    let broken = density.values.len() - finite.count();
-    if broken > 0 {
-        monitor.warn(
-            STAGE,
-            format!("{broken} density values are not finite and count as empty"),
-        );
-    }
-    // A full voxel at the border ends at its outer face: half-way to an outside as far below the threshold as full is above.
-    let outside = (-(1.0 - iso).abs().max(1e-3) * spacing) as f32;
-    let origin = density.origin - Vec3::repeat(2.0 * spacing);
-    let mut out = VoxelGrid::filled(origin, spacing, dims.map(|n| n + 4), outside);
-    for (v, &value) in density.values.iter().enumerate() {
-        let [i, j, k] = density.ijk(v);
-        let at = out.index(i + 2, j + 2, k + 2);
-        if value.is_finite() {
-            out.values[at] = ((f64::from(value).clamp(-1.0, 2.0) - iso) * spacing) as f32;
-        }
-    }
-    Ok(out)
 }
 
 fn remesh_on(
@@ -342,241 +294,4 @@ fn vanished(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A cube about the origin.
-    pub(super) fn cube(side: f64) -> TriMesh {
-        let points = (0..8)
-            .map(|c| {
-                Vec3::new(f64::from(c & 1), f64::from(c >> 1 & 1), f64::from(c >> 2))
-                    .add_scalar(-0.5)
-                    * side
-            })
-            .collect();
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-            .collect();
-        TriMesh {
-            points,
-            triangles,
-            tags: vec![],
-        }
-    }
-
-    fn remesh_at(mesh: &TriMesh, voxel: f64) -> Result<Remeshed, RemeshError> {
-        remesh(
-            mesh,
-            &RemeshOptions {
-                voxel: Some(voxel),
-                ..RemeshOptions::default()
-            },
-            &Monitor::default(),
-        )
-    }
-
-    #[test]
-    fn a_cube_keeps_volume_and_place() {
-        let out = remesh_at(&cube(10.0), 0.37).expect("a cube");
-        assert!(
-            (out.solid.volume() - 1000.0).abs() < 10.0,
-            "{}",
-            out.solid.volume()
-        );
-        assert!(out.distance_max < 0.37, "{}", out.distance_max);
-        assert_eq!(
-            (out.genus_before, out.genus_after, out.changes.len()),
-            (0, 0, 0)
-        );
-    }
-
-    #[test]
-    fn what_is_no_solid_is_refused() {
-        let mut inverted = cube(10.0);
-        inverted.triangles.iter_mut().for_each(|t| t.swap(0, 1));
-        let error = remesh_at(&inverted, 0.5).expect_err("inside out");
-        assert!(error.hint().is_some_and(|h| h.contains("flip")), "{error}");
-        let mut sheet = cube(10.0);
-        sheet.triangles.truncate(2);
-        assert!(matches!(
-            remesh_at(&sheet, 0.5),
-            Err(RemeshError::NotSolid { .. })
-        ));
-        assert_eq!(
-            remesh_at(&TriMesh::default(), 0.5).err(),
-            Some(RemeshError::Empty)
-        );
-        assert!(matches!(
-            remesh_at(&cube(10.0), 1e-9),
-            Err(RemeshError::TooManyVoxels { .. })
-        ));
-        assert!(matches!(
-            remesh_at(&cube(10.0), f64::NAN),
-            Err(RemeshError::BadOption { .. })
-        ));
-        let monitor = Monitor::default();
-        monitor.cancel();
-        assert!(matches!(
-            remesh(&cube(1.0), &RemeshOptions::default(), &monitor),
-            Err(RemeshError::Cancelled(_))
-        ));
-    }
-
-    /// A plate 20 x 20 x 3 with square holes, as density on a unit grid.
-    fn plate(holes: &[(usize, usize, usize)]) -> VoxelGrid<f32> {
-        let mut grid = VoxelGrid::filled(Vec3::zeros(), 1.0, [24, 24, 7], 0f32);
-        for k in 2..5 {
-            for j in 2..22 {
-                for i in 2..22 {
-                    let open = holes
-                        .iter()
-                        .any(|&(x, y, n)| (x..x + n).contains(&i) && (y..y + n).contains(&j));
-                    let v = grid.index(i, j, k);
-                    grid.values[v] = if open { 0.0 } else { 1.0 };
-                }
-            }
-        }
-        grid
-    }
-
-    #[test]
-    fn pinholes_close_and_windows_stay() {
-        let density = plate(&[(5, 5, 1), (12, 5, 2), (6, 12, 6)]);
-        let out = remesh_density(
-            &density,
-            0.5,
-            &RemeshOptions::default(),
-            &Monitor::default(),
-        )
-        .expect("a plate");
-        assert_eq!((out.genus_before, out.genus_after), (3, 1));
-        assert_eq!(out.changes.len(), 2);
-        assert!(
-            out.changes
-                .iter()
-                .all(|c| c.kind == ChangeKind::TunnelClosed && c.size < 3.0)
-        );
-        let first = &out.changes[0];
-        assert!(
-            (first.place - Vec3::new(12.5, 5.5, 3.0)).norm() < 0.7,
-            "{first:?}"
-        );
-        // The plug is as thick as the plate: no dent deeper than half a voxel of the source.
-        let depth = out.field.sample(&Vec3::new(12.5, 5.5, 3.0));
-        assert!(depth > 0.6, "{depth}");
-        let off = RemeshOptions {
-            min_tunnel: 0.0,
-            ..RemeshOptions::default()
-        };
-        let out = remesh_density(&density, 0.5, &off, &Monitor::default()).expect("a plate");
-        assert_eq!((out.genus_after, out.changes.len()), (3, 0));
-    }
-
-    #[test]
-    fn a_kept_bore_stays() {
-        let density = plate(&[(5, 5, 2), (14, 14, 2)]);
-        let bore = Capsule {
-            a: Vec3::new(5.5, 5.5, 0.0),
-            b: Vec3::new(5.5, 5.5, 6.0),
-            radius: 2.0,
-        };
-        let options = RemeshOptions {
-            keep_open: vec![bore],
-            ..RemeshOptions::default()
-        };
-        let out = remesh_density(&density, 0.5, &options, &Monitor::default()).expect("a plate");
-        assert_eq!((out.genus_before, out.genus_after), (2, 1));
-    }
-
-    #[test]
-    fn islands_cavities_and_short_bridges_go_and_struts_stay() {
-        // Two blocks joined by a thick bar; beside it a thin short bridge.
-        let mut grid = VoxelGrid::filled(Vec3::zeros(), 1.0, [30, 30, 16], 0f32);
-        let mut fill = |x: std::ops::Range<usize>,
-                        y: std::ops::Range<usize>,
-                        z: std::ops::Range<usize>,
-                        value: f32| {
-            for k in z {
-                for j in y.clone() {
-                    for i in x.clone() {
-                        let v = grid.index(i, j, k);
-                        grid.values[v] = value;
-                    }
-                }
-            }
-        };
-        fill(2..13, 2..28, 2..14, 1.0);
-        fill(17..28, 2..28, 2..14, 1.0);
-        fill(13..17, 2..10, 2..14, 1.0);
-        fill(13..17, 24..25, 7..8, 1.0);
-        fill(6..8, 15..17, 6..8, 0.0);
-        fill(14..16, 27..29, 14..15, 1.0);
-        let out = remesh_density(&grid, 0.5, &RemeshOptions::default(), &Monitor::default())
-            .expect("blocks");
-        let mut kinds: Vec<String> = out
-            .changes
-            .iter()
-            .map(|c| format!("{:?}", c.kind))
-            .collect();
-        kinds.sort();
-        assert_eq!(
-            (out.genus_before, out.genus_after),
-            (1, 1),
-            "{kinds:?}: a bridge longer than the limit stays"
-        );
-        assert_eq!(kinds, ["CavityFilled", "IslandDropped"]);
-    }
-
-    #[test]
-    fn densities_that_cannot_work_are_refused() {
-        let run = |grid: &VoxelGrid<f32>| {
-            remesh_density(grid, 0.5, &RemeshOptions::default(), &Monitor::default())
-        };
-        let mut grid = VoxelGrid::filled(Vec3::zeros(), 1.0, [8; 3], 0f32);
-        assert!(matches!(run(&grid), Err(RemeshError::NoMaterial { .. })));
-        grid.values.fill(f32::NAN);
-        assert!(matches!(run(&grid), Err(RemeshError::NoMaterial { .. })));
-        grid.values.pop();
-        assert!(matches!(run(&grid), Err(RemeshError::BadGrid { .. })));
-        // A checkerboard is nothing but islands.
-        let mut grid = VoxelGrid::filled(Vec3::zeros(), 1.0, [12; 3], 0f32);
-        for v in 0..grid.values.len() {
-            grid.values[v] = (grid.ijk(v).iter().sum::<usize>() % 2) as f32;
-        }
-        assert!(matches!(run(&grid), Err(RemeshError::Vanished { .. })));
-    }
-
-    #[test]
-    fn threads_do_not_change_a_bit() {
-        let density = plate(&[(5, 5, 1), (6, 12, 6)]);
-        let run = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .expect("a pool");
-            pool.install(|| {
-                remesh_density(
-                    &density,
-                    0.5,
-                    &RemeshOptions::default(),
-                    &Monitor::default(),
-                )
-            })
-            .expect("a plate")
-        };
-        let (one, two) = (run(1), run(2));
-        assert_eq!(one.field, two.field);
-        assert_eq!(one.solid, two.solid);
-        assert_eq!(one.changes, two.changes);
-        assert_eq!(one.distance_max, two.distance_max);
-    }
-}
+mod tests;

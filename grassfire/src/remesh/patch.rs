@@ -1,6 +1,10 @@
 //! Puts a membrane of voxels into the field as a smooth plate, without any other change of topology.
 
+use nalgebra::Matrix3;
+use rayon::prelude::*;
+
 use super::digital::{VoxelSet, is_simple};
+use super::noise::CleanUp;
 use super::smooth::weights;
 use crate::Vec3;
 use crate::voxel::VoxelGrid;
@@ -11,6 +15,17 @@ const PASSES: usize = 64;
 const HELD: f32 = 0.1;
 /// Smoothing of the inserted plate, voxels.
 const SIGMA: f64 = 0.7;
+/// Half-side of the cubes about a membrane's voxels that hold the rim of the wall around it, voxels.
+const RIM: usize = 2;
+/// The inverse of the share of the rim that may be beside thinner wall than the plate.
+const THINNEST: usize = 10;
+/// Radius of the neighbourhood that a membrane is flattened over, voxels.
+const FLAT: usize = 3;
+/// Fewer voxels around a place than this have no plane worth the name.
+const FEW: usize = 9;
+/// Steps from the rim to the middle of a wall at most, and the least rise of the distance on the way (per distance).
+const CLIMB: usize = 64;
+const STEEP: f32 = 0.5;
 
 /// Which side of the surface grows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,30 +70,32 @@ impl Patch {
 ///    the distance from the plate's surface; the rise is Gauss-filtered, so the rest of the field stays as it is.
 /// 2. Signs follow the new values one simple point at a time, nearest to the membrane first. A voxel that cannot follow
 ///    without another change of topology is held on its side by a small value.
-pub(super) fn insert(
-    grid: &mut VoxelGrid<f32>,
-    set: &mut VoxelSet,
-    side: Side,
-    patches: &mut [Patch],
-    width: f64,
-    kept: &[bool],
-    touched: &mut [bool],
-) {
+pub(super) fn insert(work: &mut CleanUp, side: Side, patches: &mut [Patch]) {
     if patches.is_empty() {
         return;
     }
+    let CleanUp {
+        grid,
+        set,
+        width,
+        kept,
+        touched,
+        ..
+    } = work;
     let h = grid.spacing;
     let sign = if side == Side::Solid { 1f32 } else { -1.0 };
     let mut plate = vec![f32::NEG_INFINITY; grid.values.len()];
     let mut region = Vec::new();
     for patch in patches.iter_mut() {
         if patch.reach <= 0.0 {
-            patch.reach = wall(grid, set, patch, sign);
+            // A pinhole is filled flush even in a block, a wide gap in a block gets no more than a web.
+            let thickest = *width / 2.0 - patch.width.powi(2) / (3.0 * *width);
+            patch.reach = wall(grid, set, patch, sign).min(thickest);
         }
-        patch.reach = patch.reach.clamp(h, (width / 2.0).max(h));
+        patch.reach = patch.reach.clamp(h, (*width / 2.0).max(h));
         raise(grid, patch, &mut plate, &mut region);
     }
-    region.retain(|&v| !set.on_border(v) && !kept.get(v as usize).copied().unwrap_or(false));
+    region.retain(|&v| !set.on_border(v) && kept.get(v as usize) != Some(&true));
     region.sort_unstable();
     let mut values: Vec<f32> = {
         let rise = smooth_rise(grid, &plate, sign);
@@ -99,24 +116,46 @@ pub(super) fn insert(
     }
 }
 
-/// Half thickness of the wall around the membrane: the depths of its voxels are spread evenly from 0 to that, so it is
-/// twice their median.
+/// Half thickness of the wall around the membrane, mm: how deep the wall is at the thinnest tenth of the rim. The median
+/// would often be the depth of a member that the wall runs along.
 fn wall(grid: &VoxelGrid<f32>, set: &VoxelSet, patch: &Patch, sign: f32) -> f64 {
-    let mut depths = Vec::new();
+    let mut rim = Vec::new();
     for &v in &patch.voxels {
-        for_each_near(grid, v, 3, |n, _| {
-            let depth = sign * grid.values[n];
+        for_each_near(grid, v, RIM, |n, _| {
             // The membrane's own voxels are members of the set but still have the sign of the other side.
-            if depth > 0.0 && set.solid[n] == (sign > 0.0) {
-                depths.push(depth);
+            if sign * grid.values[n] > 0.0 && set.solid[n] == (sign > 0.0) {
+                rim.push(n as u32);
             }
         });
     }
-    if depths.is_empty() {
-        return 0.0;
-    }
+    rim.sort_unstable();
+    rim.dedup();
+    let mut depths: Vec<f32> = rim.iter().map(|&v| climb(grid, v, sign)).collect();
     depths.sort_by(f32::total_cmp);
-    2.0 * f64::from(depths[depths.len() / 2])
+    depths
+        .get(depths.len() / THINNEST)
+        .map_or(0.0, |&depth| f64::from(depth))
+}
+
+/// The depth of the wall at `v`, mm: the distance is followed as long as it rises steeply, and so to the middle of the
+/// wall but not along it.
+fn climb(grid: &VoxelGrid<f32>, mut v: u32, sign: f32) -> f32 {
+    let h = grid.spacing as f32;
+    let mut depth = sign * grid.values[v as usize];
+    for _ in 0..CLIMB {
+        let mut best = (STEEP * h, v, depth);
+        for_each_near(grid, v, 1, |n, d| {
+            let value = sign * grid.values[n];
+            if d > 0.0 && (value - depth) / d > best.0 {
+                best = ((value - depth) / d, n as u32, value);
+            }
+        });
+        if best.1 == v {
+            break;
+        }
+        (_, v, depth) = best;
+    }
+    depth
 }
 
 /// Calls `visit` with the index and the distance (voxels) of every voxel of the cube of half-side `reach` about `v`.
@@ -136,16 +175,47 @@ fn for_each_near(grid: &VoxelGrid<f32>, v: u32, reach: usize, mut visit: impl Fn
 
 /// Writes the signed distance of the plate around a membrane (positive within) and lists the voxels it reaches.
 fn raise(grid: &VoxelGrid<f32>, patch: &Patch, plate: &mut [f32], region: &mut Vec<u32>) {
-    let h = grid.spacing as f32;
     let cells = (patch.reach / grid.spacing).ceil() as usize + 3;
-    for &v in &patch.voxels {
-        for_each_near(grid, v, cells, |n, d| {
+    for (&v, place) in patch.voxels.iter().zip(flattened(grid, patch)) {
+        for_each_near(grid, v, cells, |n, _| {
             if plate[n] == f32::NEG_INFINITY {
                 region.push(n as u32);
             }
-            plate[n] = plate[n].max(patch.reach as f32 - d * h);
+            let [i, j, k] = grid.ijk(n);
+            let distance = (grid.centre(i, j, k) - place).norm();
+            plate[n] = plate[n].max((patch.reach - distance) as f32);
         });
     }
+}
+
+/// The centres of the membrane's voxels without their steps, mm: each is moved onto the plane that fits the ones around
+/// it best. Over the steps a plate would be up to a voxel thicker than wanted.
+fn flattened(grid: &VoxelGrid<f32>, patch: &Patch) -> Vec<Vec3> {
+    let centre = |v: u32| {
+        let [i, j, k] = grid.ijk(v as usize);
+        grid.centre(i, j, k)
+    };
+    let flat = |&v: &u32| {
+        let mut near = Vec::new();
+        for_each_near(grid, v, FLAT, |n, d| {
+            if d <= FLAT as f32 && patch.voxels.binary_search(&(n as u32)).is_ok() {
+                near.push(centre(n as u32));
+            }
+        });
+        let mean = near.iter().sum::<Vec3>() / near.len() as f64;
+        let spread: Matrix3<f64> = near
+            .iter()
+            .map(|p| (p - mean) * (p - mean).transpose())
+            .sum();
+        let eigen = spread.symmetric_eigen();
+        let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+        let place = centre(v);
+        if near.len() < FEW {
+            return place;
+        }
+        place - normal * normal.dot(&(place - mean))
+    };
+    patch.voxels.par_iter().map(flat).collect()
 }
 
 /// The Gauss-filtered amount by which the plate exceeds the field.
