@@ -8,7 +8,7 @@ use super::complex::{Complex, root};
 use super::regions::facing_slots;
 use super::unit;
 
-/// Most reorderings tried for one vertex.
+/// Most orders tried for one vertex.
 const MOST_TRIES: usize = 2000;
 
 /// Sorts the quads of every seam edge counter-clockwise about it.
@@ -17,8 +17,8 @@ const MOST_TRIES: usize = 2000;
 /// middle, and where sheets run close together two edges of one vertex may disagree about who is next to whom: the
 /// regions would then close up to a surface with handles instead of a sphere. Such vertices are mended:
 /// 1. Sort by the angle of the quads' centres about the edge.
-/// 2. At a vertex with handles, swap two neighbours of one of its edges, the closest first; when the vertex at the
-///    other end has handles then, go on there with another edge (cheapest path, the sum of the angles swapped).
+/// 2. At a vertex with handles, sort one of its edges another way, that with the least angles in the wrong order first;
+///    when the vertex at the other end has handles then, go on there with another edge (cheapest path).
 ///
 /// A vertex that cannot be mended stays as it is; the checks of the body report it.
 pub(super) fn sort_sectors(complex: &mut Complex) {
@@ -81,17 +81,17 @@ fn seams_of_vertices(complex: &Complex) -> Vec<Vec<u32>> {
     seams
 }
 
-/// Swap of the quads `place` and `place + 1` about an edge.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Swap {
+/// Another order of the quads about an edge: the places where they stand now.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct Order {
     edge: u32,
-    place: usize,
+    places: Vec<usize>,
 }
 
-/// A swap reached by the search, and the vertex that it may have spoiled.
+/// An order reached by the search, and the vertex that it may have spoiled.
 struct Reached {
     cost: f64,
-    swap: Swap,
+    order: Order,
     vertex: u32,
     from: Option<usize>,
 }
@@ -153,57 +153,64 @@ impl Sorter<'_> {
         (2 * roots(&fan) + corners.len()).saturating_sub(edges.len() + roots(&region))
     }
 
-    fn handles_after(&mut self, v: u32, swaps: &[Swap]) -> usize {
-        swaps.iter().for_each(|s| self.apply(*s));
+    fn handles_after(&mut self, v: u32, orders: &[&Order]) -> usize {
+        let saved: Vec<_> = orders.iter().map(|order| self.apply(order)).collect();
         let handles = self.handles(v);
-        swaps.iter().rev().for_each(|s| self.apply(*s));
+        saved.into_iter().rev().for_each(|s| self.restore(s));
         handles
     }
 
-    /// Does the swap; done twice it changes nothing.
-    fn apply(&mut self, Swap { edge, place }: Swap) {
-        let next = (place + 1) % self.angles[edge as usize].len();
-        self.complex.edges[edge as usize].uses.swap(place, next);
-        self.angles[edge as usize].swap(place, next);
+    /// Sorts the quads about an edge; returns what was there.
+    fn apply(&mut self, order: &Order) -> Saved {
+        let e = order.edge as usize;
+        let saved = Saved {
+            edge: order.edge,
+            uses: self.complex.edges[e].uses.clone(),
+            angles: self.angles[e].clone(),
+        };
+        self.complex.edges[e].uses = order.places.iter().map(|&i| saved.uses[i]).collect();
+        self.angles[e] = order.places.iter().map(|&i| saved.angles[i]).collect();
+        saved
     }
 
-    /// Every other order of seam edge `edge` one swap away, with its cost.
-    fn swaps(&self, edge: u32) -> Vec<(f64, Swap)> {
+    fn restore(&mut self, saved: Saved) {
+        self.complex.edges[saved.edge as usize].uses = saved.uses;
+        self.angles[saved.edge as usize] = saved.angles;
+    }
+
+    /// Other orders of seam edge `edge` with their costs, best first.
+    fn orders(&self, edge: u32) -> Vec<(f64, Order)> {
         let angles = &self.angles[edge as usize];
-        let count = angles.len();
-        let mut swaps: Vec<(f64, Swap)> = (0..count)
-            .map(|place| {
-                let turn = (angles[(place + 1) % count] - angles[place]).rem_euclid(TAU);
-                (turn.min(TAU - turn), Swap { edge, place })
+        let mut orders: Vec<(f64, Order)> = cyclic_orders(angles.len())
+            .into_iter()
+            .map(|places| {
+                let turned: Vec<f64> = places.iter().map(|&i| angles[i]).collect();
+                (disorder(&turned), Order { edge, places })
             })
             .collect();
-        swaps.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        if count == 3 {
-            // All swaps of three give the same cyclic order.
-            swaps.truncate(1);
-        }
-        swaps
+        orders.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        orders
     }
 
-    /// Takes handles away from `v` without giving any to others; false when no swaps do.
+    /// Takes handles away from `v` without giving any to others; false when no orders do.
     fn mend(&mut self, v: u32) -> bool {
         let mut reached: Vec<Reached> = Vec::new();
         let mut waiting = BinaryHeap::new();
         let mut seen = BTreeSet::new();
         self.spread(v, None, &mut reached, &mut waiting, &mut seen);
         while let Some(Waiting(_, i)) = waiting.pop() {
-            let (swap, vertex) = (reached[i].swap, reached[i].vertex);
-            if self.handles_after(vertex, &[swap]) > self.handles(vertex) {
+            let vertex = reached[i].vertex;
+            if self.handles_after(vertex, &[&reached[i].order]) > self.handles(vertex) {
                 if reached.len() < MOST_TRIES {
                     self.spread(vertex, Some(i), &mut reached, &mut waiting, &mut seen);
                 }
                 continue;
             }
-            let mut path = vec![reached[i].swap];
+            let mut path = vec![&reached[i].order];
             let mut vertices = vec![v, vertex];
             let mut last = i;
             while let Some(from) = reached[last].from {
-                path.push(reached[from].swap);
+                path.push(&reached[from].order);
                 vertices.push(reached[from].vertex);
                 last = from;
             }
@@ -212,43 +219,43 @@ impl Sorter<'_> {
             // A path may cross itself: only the sum over all its vertices tells.
             let sum = |s: &Self| vertices.iter().map(|&v| s.handles(v)).sum::<usize>();
             let before = sum(self);
-            path.iter().for_each(|s| self.apply(*s));
+            let saved: Vec<_> = path.iter().map(|order| self.apply(order)).collect();
             if sum(self) < before {
                 return true;
             }
-            path.iter().rev().for_each(|s| self.apply(*s));
+            saved.into_iter().rev().for_each(|s| self.restore(s));
         }
         false
     }
 
-    /// Adds the swaps that mend `v`: one with handles, or one spoiled by the swap `from`.
+    /// Adds the orders that mend `v`: one with handles, or one spoiled by the order `from`.
     fn spread(
         &mut self,
         v: u32,
         from: Option<usize>,
         reached: &mut Vec<Reached>,
         waiting: &mut BinaryHeap<Waiting>,
-        seen: &mut BTreeSet<(Swap, u32)>,
+        seen: &mut BTreeSet<(Order, u32)>,
     ) {
-        let spoiling = from.map(|i| reached[i].swap);
+        let spoiling = from.map(|i| reached[i].order.clone());
         let cost = from.map_or(0.0, |i| reached[i].cost);
         let before = self.handles(v);
         for e in self.seams[v as usize].clone() {
-            if spoiling.is_some_and(|s| s.edge == e) {
+            if spoiling.as_ref().is_some_and(|s| s.edge == e) {
                 continue;
             }
             let [a, b] = self.complex.edges[e as usize].ends;
             let vertex = if a == v { b } else { a };
-            for (angle, swap) in self.swaps(e) {
-                let after = match spoiling {
-                    Some(spoiling) => self.handles_after(v, &[spoiling, swap]),
-                    None => self.handles_after(v, &[swap]) + 1,
+            for (angle, order) in self.orders(e) {
+                let after = match &spoiling {
+                    Some(spoiling) => self.handles_after(v, &[spoiling, &order]),
+                    None => self.handles_after(v, &[&order]) + 1,
                 };
-                if after <= before && seen.insert((swap, vertex)) {
+                if after <= before && seen.insert((order.clone(), vertex)) {
                     waiting.push(Waiting(cost + angle, reached.len()));
                     reached.push(Reached {
                         cost: cost + angle,
-                        swap,
+                        order,
                         vertex,
                         from,
                     });
@@ -258,7 +265,75 @@ impl Sorter<'_> {
     }
 }
 
+/// The quads about an edge as they were.
+struct Saved {
+    edge: u32,
+    uses: Vec<(u32, u8)>,
+    angles: Vec<f64>,
+}
+
+/// Cyclic orders of `count` things but the present one: all up to five, else those one swap of neighbours away.
+fn cyclic_orders(count: usize) -> Vec<Vec<usize>> {
+    let present: Vec<usize> = (0..count).collect();
+    if count > 5 {
+        return (0..count)
+            .map(|i| {
+                let mut order = present.clone();
+                order.swap(i, (i + 1) % count);
+                order
+            })
+            .collect();
+    }
+    let mut orders = vec![vec![0]];
+    for next in 1..count {
+        let grow = |order: &Vec<usize>| {
+            let order = order.clone();
+            (1..=order.len()).map(move |at| {
+                let mut longer = order.clone();
+                longer.insert(at, next);
+                longer
+            })
+        };
+        orders = orders.iter().flat_map(grow).collect();
+    }
+    orders.retain(|order| *order != present);
+    orders
+}
+
+/// How far a cyclic order is from that of its angles: the sum of the angles between pairs in the wrong order, counted
+/// from the best of the members.
+fn disorder(angles: &[f64]) -> f64 {
+    let count = angles.len();
+    let from = |base: usize| {
+        let turn = |i: usize| (angles[(base + i) % count] - angles[base]).rem_euclid(TAU);
+        (1..count)
+            .flat_map(|i| (i + 1..count).map(move |j| (i, j)))
+            .map(|(i, j)| (turn(i) - turn(j)).max(0.0))
+            .sum::<f64>()
+    };
+    (0..count).map(from).fold(f64::INFINITY, f64::min)
+}
+
 fn join(parent: &mut [usize], a: usize, b: usize) {
     let (a, b) = (root(parent, a), root(parent, b));
     parent[a.max(b)] = a.min(b);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cyclic_orders_are_counted_once() {
+        let counts = [3, 4, 5, 6].map(|n| cyclic_orders(n).len());
+        assert_eq!(counts, [1, 5, 23, 6]);
+    }
+
+    #[test]
+    fn the_cheapest_change_swaps_the_closest_pair() {
+        assert_eq!(disorder(&[0.0, 1.0, 2.0]), 0.0);
+        assert!((disorder(&[0.0, 2.5, 2.0]) - 0.5).abs() < 1e-12);
+        // 6.2 and 0 are close to each other across the start of the circle.
+        assert!((disorder(&[6.2, 2.0, 0.0]) - (TAU - 6.2)).abs() < 1e-12);
+    }
 }
