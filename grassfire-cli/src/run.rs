@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use grassfire::io::atomic_write;
 use grassfire::monitor::Monitor;
 use grassfire::pipeline::{Outcome, ReconstructJob, ReconstructOptions, reconstruct};
 use grassfire::report;
@@ -74,10 +75,10 @@ pub fn demo_command(args: &DemoArgs) -> Result<u8, Failure> {
 
 fn unpack(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, Failure> {
     let path = folder.join(name);
-    let refuse =
-        |e: std::io::Error| Failure::usage(format!("cannot write {}: {e}", path.display()), None);
-    std::fs::create_dir_all(folder).map_err(refuse)?;
-    std::fs::write(&path, bytes).map_err(refuse)?;
+    std::fs::create_dir_all(folder)
+        .map_err(|e| Failure::usage(format!("{}: cannot be made: {e}", folder.display()), None))?;
+    atomic_write(&path, |file| file.write_all(bytes))
+        .map_err(|e| Failure::usage(e.to_string(), None))?;
     Ok(path)
 }
 

@@ -74,6 +74,49 @@ fn seams_of_three_and_four_sheets() {
     }
 }
 
+/// A straight seam of sheets; `angles[i]` are the directions of the sheets at height `i`, degrees.
+fn twisted_seam(angles: &[Vec<f64>]) -> Skeleton {
+    let mut b = Builder::new(1.0);
+    for sheet in 0..angles[0].len() {
+        let at = |i: usize, out: f64| {
+            let (s, c) = angles[i][sheet].to_radians().sin_cos();
+            10.0 * v(out * c, out * s, i as f64)
+        };
+        for i in 0..angles.len() - 1 {
+            let corners = [at(i, 0.0), at(i, 1.0), at(i + 1, 1.0), at(i + 1, 0.0)];
+            let quad = corners.map(|p| b.point(p));
+            b.skeleton.quads.push(quad);
+        }
+    }
+    b.skeleton
+}
+
+#[test]
+fn close_sheets_that_change_places_along_a_seam() {
+    let plain = vec![0.0, 120.0, 240.0];
+    let near = vec![0.0, 160.0, 200.0];
+    let swapped = vec![0.0, 220.0, 140.0];
+    // The last edge sees the second and third sheet the other way round.
+    body(&twisted_seam(&[
+        plain.clone(),
+        near.clone(),
+        swapped.clone(),
+    ]));
+    // Two edges in the middle do: neither vertex can be mended without the other edge.
+    let rows = [
+        &plain, &near, &swapped, &swapped, &swapped, &near, &plain, &plain,
+    ];
+    body(&twisted_seam(&rows.map(Vec::clone)));
+    let five = |a: f64, b: f64| vec![0.0, 80.0, a, b, 290.0];
+    let rows = [
+        five(150.0, 220.0),
+        five(190.0, 210.0),
+        five(230.0, 180.0),
+        five(190.0, 210.0),
+    ];
+    body(&twisted_seam(&rows));
+}
+
 #[test]
 fn seam_ends_inside_a_sheet() {
     let mut b = plate();
@@ -201,6 +244,14 @@ fn many_beams_on_one_sheet_vertex() {
         );
     }
     assert_eq!(body(&b.skeleton).rules.plug_feet, 14);
+}
+
+#[test]
+fn a_short_loop_whose_two_feet_share_an_edge() {
+    let mut b = plate();
+    b.beam(v(15.0, 15.0, 0.0), v(17.5, 15.0, 4.0), 1);
+    b.beam(v(17.5, 15.0, 4.0), v(20.0, 15.0, 0.0), 1);
+    assert_eq!(body(&b.skeleton).rules.plug_feet, 2);
 }
 
 #[test]
@@ -338,6 +389,11 @@ proptest! {
             b.beam(Vec3::zeros(), d.normalize() * (10.0 + i as f64), steps);
         }
         body(&b.skeleton);
+    }
+
+    #[test]
+    fn seams_of_any_twisted_sheets(rows in prop::collection::vec(prop::collection::vec(0.0f64..360.0, 4), 2..8)) {
+        body(&twisted_seam(&rows));
     }
 
     #[test]

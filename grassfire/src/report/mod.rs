@@ -10,8 +10,7 @@ mod html;
 pub mod papers;
 pub mod render;
 
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,6 +24,7 @@ pub use blocks::{
 pub use checks::{Check, Limits, judge};
 pub use html::to_html;
 
+use crate::io::{IoError, atomic_write};
 use render::PictureSize;
 
 /// Settings of the report.
@@ -75,13 +75,8 @@ pub struct Picture {
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The file system refused.
-    #[error("cannot write {}", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] IoError),
     /// The report could not be turned into JSON.
     #[error("cannot write the report as JSON")]
     Json(#[from] serde_json::Error),
@@ -94,9 +89,7 @@ impl ReportError {
     /// What the user can do about it.
     pub fn hint(&self) -> Option<String> {
         match self {
-            Self::Write { .. } => {
-                Some("choose a folder that you may write to with -o DIR".to_owned())
-            }
+            Self::Write(_) => Some("choose a folder that you may write to with -o DIR".to_owned()),
             Self::Render(_) => {
                 Some("set report.pictures=false or another report.picture_width".to_owned())
             }
@@ -122,7 +115,7 @@ pub fn to_json(report: &Report) -> Result<String, ReportError> {
 /// # Errors
 /// [`ReportError::Write`] when the file cannot be written.
 pub fn write_json(path: &Path, report: &Report) -> Result<(), ReportError> {
-    write(path, &to_json(report)?)
+    write(path, to_json(report)?)
 }
 
 /// Writes `report.html`: one self-contained file with the pictures inside.
@@ -130,14 +123,11 @@ pub fn write_json(path: &Path, report: &Report) -> Result<(), ReportError> {
 /// # Errors
 /// [`ReportError::Write`] when the file cannot be written.
 pub fn write_html(path: &Path, report: &Report, pictures: &[Picture]) -> Result<(), ReportError> {
-    write(path, &to_html(report, pictures))
+    write(path, to_html(report, pictures))
 }
 
-fn write(path: &Path, text: &str) -> Result<(), ReportError> {
-    std::fs::write(path, text).map_err(|source| ReportError::Write {
-        path: path.to_owned(),
-        source,
-    })
+fn write(path: &Path, text: String) -> Result<(), ReportError> {
+    Ok(atomic_write(path, |file| file.write_all(text.as_bytes()))?)
 }
 
 /// serde_json writes NaN and infinity as null: a list with one of them is not usable, so its key goes too.

@@ -63,30 +63,15 @@ impl Default for SkeletonOptions {
 
 impl SkeletonOptions {
     fn check(&self, spacing: f64) -> Result<(), SkeletonError> {
-        let positive = |name, value: f64| {
-            let good = value > 0.0 && value.is_finite();
-            if good {
+        let inside = |good: bool, name, value: f64, range| {
+            if good && value.is_finite() {
                 Ok(())
             } else {
-                Err(SkeletonError::Option {
-                    name,
-                    value,
-                    range: "above 0",
-                })
+                Err(SkeletonError::Option { name, value, range })
             }
         };
-        let not_negative = |name, value: f64| {
-            let good = value >= 0.0 && value.is_finite();
-            if good {
-                Ok(())
-            } else {
-                Err(SkeletonError::Option {
-                    name,
-                    value,
-                    range: "0 or more",
-                })
-            }
-        };
+        let positive = |name, value: f64| inside(value > 0.0, name, value, "above 0");
+        let not_negative = |name, value: f64| inside(value >= 0.0, name, value, "0 or more");
         positive("spacing", spacing)?;
         positive("skeleton.quad_size", self.quad_size.unwrap_or(1.0))?;
         positive("skeleton.size_factor", self.size_factor)?;
@@ -95,15 +80,12 @@ impl SkeletonOptions {
         not_negative("skeleton.member_width", self.member_width)?;
         not_negative("skeleton.member_size", self.member_size)?;
         not_negative("skeleton.spur", self.spur)?;
-        if self.smoothing > 1000 {
-            let value = self.smoothing as f64;
-            return Err(SkeletonError::Option {
-                name: "skeleton.smoothing",
-                value,
-                range: "0 to 1000",
-            });
-        }
-        Ok(())
+        inside(
+            self.smoothing <= 1000,
+            "skeleton.smoothing",
+            self.smoothing as f64,
+            "0 to 1000",
+        )
     }
 }
 

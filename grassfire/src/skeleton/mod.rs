@@ -5,6 +5,7 @@ mod build;
 mod check;
 mod coarsen;
 mod complex;
+mod cut;
 mod edges;
 mod error;
 mod members;

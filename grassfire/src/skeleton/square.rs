@@ -6,7 +6,7 @@ use super::polygons::{Polygon, angle, edge_table, quad_quality};
 use super::reference::Reference;
 use crate::Vec3;
 
-const ROUNDS: usize = 30;
+const ROUNDS: usize = 100;
 /// A rim or seam that turns by more than this at a vertex has a corner there, which stays, degrees.
 const SHARP: f64 = 50.0;
 

@@ -1,4 +1,5 @@
-//! Clean-up of the quads: doublets, diagonal collapse and edge rotation, as long as the valences come nearer to ideal.
+//! Clean-up of the quads: doublets, diagonal collapse and edge rotation, as long as the valences come nearer to ideal;
+//! a rotation that changes nothing is taken where it makes way for one of these.
 //!
 //! Ideal is four quads inside a sheet, and on rims and seams the sheet's opening angle over 90 degrees.
 
@@ -11,6 +12,8 @@ use crate::monitor::{Cancelled, Monitor};
 /// Operations between two topology checks; a batch that changes the Betti numbers is undone.
 const BATCH: usize = 16;
 const MAX_BATCHES: usize = 60;
+/// Most detours tried.
+const MAX_TRIALS: usize = 4000;
 
 /// The quads of a skeleton while they are being improved.
 pub(crate) struct Tidy<'a> {
@@ -26,6 +29,7 @@ struct Tables {
     around: Vec<Vec<u32>>,
 }
 
+#[derive(Debug, Clone)]
 enum Operation {
     Doublet {
         keep: u32,
@@ -53,6 +57,7 @@ impl Tidy<'_> {
         let ideal = self.ideal(&tables, &fixed);
         self.relax(&fixed, 3);
         let mut total = 0;
+        let mut trials = MAX_TRIALS;
         for _ in 0..MAX_BATCHES {
             monitor.check()?;
             let saved = (
@@ -65,12 +70,17 @@ impl Tidy<'_> {
             let mut done = 0;
             while done < BATCH {
                 let tables = self.tables();
-                let Some(operation) = self.best(&tables, &fixed, &ideal) else {
-                    break;
+                let next = match self.best(&tables, &fixed, &ideal) {
+                    Some(operation) => Some(vec![operation]),
+                    None => self.detour(&tables, &fixed, &ideal, &mut trials),
                 };
-                self.apply(operation, &tables);
-                fixed = self.fixed(&self.tables());
-                self.relax(&fixed, 2);
+                let Some(operations) = next else { break };
+                for operation in operations {
+                    let tables = self.tables();
+                    self.apply(operation, &tables);
+                    fixed = self.fixed(&self.tables());
+                    self.relax(&fixed, 2);
+                }
                 done += 1;
             }
             if self.betti() != topology {
@@ -183,31 +193,81 @@ impl Tidy<'_> {
         if let Some(doublet) = self.doublet(tables, fixed) {
             return Some(doublet);
         }
-        let mut best: Option<(i64, Operation)> = None;
-        let mut offer = |gain: i64, operation: Operation| {
-            if gain < 0 && best.as_ref().is_none_or(|b| gain < b.0) {
-                best = Some((gain, operation));
-            }
-        };
-        for i in 0..self.quads.len() as u32 {
-            for k in 0..2 {
-                if let Some((gain, operation)) = self.collapse(i, k, tables, fixed, ideal) {
-                    offer(gain, operation);
-                }
+        let all: Vec<u32> = (0..self.quads.len() as u32).collect();
+        let gaining = self.operations(&all, tables, fixed, ideal);
+        gaining
+            .into_iter()
+            .filter(|(gain, _)| *gain < 0)
+            .min_by_key(|(gain, _)| *gain)
+            .map(|(_, operation)| operation)
+    }
+
+    /// Collapses and rotations of the given quads, with their gains.
+    fn operations(
+        &self,
+        quads: &[u32],
+        tables: &Tables,
+        fixed: &[bool],
+        ideal: &[i64],
+    ) -> Vec<(i64, Operation)> {
+        let mut found = Vec::new();
+        let mut edges = Vec::new();
+        for &i in quads {
+            let Some(q) = self.quads[i as usize].and_then(|q| q.as_quad()) else {
+                continue;
+            };
+            found.extend((0..2).filter_map(|k| self.collapse(i, k, tables, fixed, ideal)));
+            edges.extend((0..4).map(|k| edge(q[k], q[(k + 1) % 4])));
+        }
+        edges.sort_unstable();
+        edges.dedup();
+        for e in edges {
+            if let [i, j] = *tables.edges.at(e[0], e[1]) {
+                let turns = 0..2;
+                found.extend(
+                    turns.filter_map(|turn| self.rotate(e, i, j, turn, tables, fixed, ideal)),
+                );
             }
         }
-        for (e, f) in tables.edges.iter() {
-            if let [i, j] = *f {
-                for turn in 0..2 {
-                    if let Some((gain, operation)) =
-                        self.rotate(e, i, j, turn, tables, fixed, ideal)
-                    {
-                        offer(gain, operation);
-                    }
-                }
+        found
+    }
+
+    /// A rotation that gains nothing but makes way for an operation nearby that does.
+    fn detour(
+        &mut self,
+        tables: &Tables,
+        fixed: &[bool],
+        ideal: &[i64],
+        trials: &mut usize,
+    ) -> Option<Vec<Operation>> {
+        let all: Vec<u32> = (0..self.quads.len() as u32).collect();
+        let mut level = self.operations(&all, tables, fixed, ideal);
+        level.retain(|(gain, operation)| {
+            *gain == 0 && matches!(operation, Operation::Rotate { .. })
+        });
+        for (_, operation) in level {
+            *trials = trials.checked_sub(1)?;
+            let Operation::Rotate { quads, .. } = &operation else {
+                continue;
+            };
+            let mut near: Vec<u32> = quads
+                .iter()
+                .flatten()
+                .flat_map(|&v| tables.around[v as usize].iter().copied())
+                .collect();
+            near.sort_unstable();
+            near.dedup();
+            let saved = self.quads.clone();
+            self.apply(operation.clone(), tables);
+            let turned = self.tables();
+            let after = self.operations(&near, &turned, fixed, ideal);
+            self.quads = saved;
+            let best = after.into_iter().min_by_key(|(gain, _)| *gain);
+            if let Some((_, second)) = best.filter(|(gain, _)| *gain < 0) {
+                return Some(vec![operation, second]);
             }
         }
-        best.map(|b| b.1)
+        None
     }
 
     /// Quads of `v` in `sheet`.
@@ -370,7 +430,7 @@ impl Tidy<'_> {
         };
         let gain = change(p, -1) + change(q, -1) + change(g, 1) + change(h, 1);
         let good = quads.iter().all(|q| quad_quality(self.points, q) > 0.15);
-        (gain < 0 && good).then_some((
+        good.then_some((
             gain,
             Operation::Rotate {
                 first: i,

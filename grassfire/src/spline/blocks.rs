@@ -1,6 +1,6 @@
 //! Rectangular blocks of quads between cutting lines.
 
-use super::half_edges::HalfEdges;
+use super::half_edges::QuadTopology;
 use super::motorcycle::mark;
 use super::{ControlMesh, SplineError};
 
@@ -85,7 +85,7 @@ impl Block {
 }
 
 /// One block a quad; marks every half-edge.
-pub(super) fn single_quads(half_edges: &HalfEdges, cut: &mut [bool]) -> Vec<Block> {
+pub(super) fn single_quads(half_edges: &QuadTopology, cut: &mut [bool]) -> Vec<Block> {
     cut.fill(true);
     (0..half_edges.len() / 4)
         .map(|quad| Block {
@@ -105,7 +105,7 @@ pub(super) fn single_quads(half_edges: &HalfEdges, cut: &mut [bool]) -> Vec<Bloc
 /// Cuts are added to `cut`.
 pub(super) fn rectangular_blocks(
     mesh: &ControlMesh,
-    half_edges: &HalfEdges,
+    half_edges: &QuadTopology,
     cut: &mut [bool],
 ) -> Result<Vec<Block>, SplineError> {
     let quads = mesh.quads.len();
@@ -144,7 +144,7 @@ fn not_rectangular(mesh: &ControlMesh, quad: u32) -> SplineError {
 }
 
 struct Layout<'a> {
-    half_edges: &'a HalfEdges,
+    half_edges: &'a QuadTopology,
     position: Vec<[i32; 2]>,
     turn: Vec<u8>,
     placed: Vec<bool>,
@@ -237,17 +237,17 @@ impl Layout<'_> {
         let mut best: Option<(usize, Vec<u32>)> = None;
         let degree = |v: u32| self.half_edges.ring(v).filter(|&h| cut[h as usize]).count();
         for start in members.iter().flat_map(|&q| 4 * q..4 * q + 4) {
-            let from = degree(self.half_edges.origin[start as usize]);
+            let from = degree(self.half_edges.origin(start));
             if cut[start as usize] || from == 0 {
                 continue;
             }
             let mut line = vec![start];
             let mut h = start;
-            while degree(self.half_edges.target(h)) == 0 && line.len() <= members.len() {
+            while degree(self.half_edges.head(h)) == 0 && line.len() <= members.len() {
                 h = self.half_edges.ahead(h);
                 line.push(h);
             }
-            let to = degree(self.half_edges.target(h));
+            let to = degree(self.half_edges.head(h));
             let new_points = usize::from(from == 2) + usize::from(to == 2);
             if to > 0 && best.as_ref().is_none_or(|(value, _)| new_points < *value) {
                 best = Some((new_points, line));
@@ -260,7 +260,7 @@ impl Layout<'_> {
 /// Splits blocks until none meets itself.
 fn separate(
     mesh: &ControlMesh,
-    half_edges: &HalfEdges,
+    half_edges: &QuadTopology,
     cut: &mut [bool],
     blocks: Vec<Block>,
 ) -> Result<Vec<Block>, SplineError> {
@@ -287,11 +287,11 @@ fn separate(
 }
 
 /// Pairs of lattice points on the border of `block` that are the same point of the mesh.
-fn meetings(half_edges: &HalfEdges, block: &Block) -> Vec<[[u32; 2]; 2]> {
+fn meetings(half_edges: &QuadTopology, block: &Block) -> Vec<[[u32; 2]; 2]> {
     let mut border: Vec<(u32, [u32; 2])> = Vec::new();
     for d in 0..4 {
         for (t, h) in block.side(d).into_iter().enumerate() {
-            border.push((half_edges.origin[h as usize], block.parameters(d, t as u32)));
+            border.push((half_edges.origin(h), block.parameters(d, t as u32)));
         }
     }
     border.sort_unstable();
@@ -307,7 +307,7 @@ fn meetings(half_edges: &HalfEdges, block: &Block) -> Vec<[[u32; 2]; 2]> {
 /// The lattice line that separates most meetings; among equals the one with fewest new end points, then the most central.
 fn best_split(
     block: &Block,
-    half_edges: &HalfEdges,
+    half_edges: &QuadTopology,
     cut: &[bool],
     meetings: &[[[u32; 2]; 2]],
 ) -> Option<(usize, u32)> {
@@ -332,9 +332,9 @@ fn best_split(
             };
             // Side 3 runs downward and side 0 to the right.
             let ends = if axis == 0 {
-                [half_edges.target(start), half_edges.origin[end as usize]]
+                [half_edges.head(start), half_edges.origin(end)]
             } else {
-                [half_edges.origin[start as usize], half_edges.target(end)]
+                [half_edges.origin(start), half_edges.head(end)]
             };
             let new_points = ends.iter().filter(|v| degree(**v) == 2).count();
             let key = (-separated, new_points, (2 * at).abs_diff(length), axis, at);
@@ -348,6 +348,7 @@ fn best_split(
 
 #[cfg(test)]
 mod tests {
+    use super::super::half_edges::connect;
     use super::*;
     use crate::Vec3;
     use crate::spline::motorcycle::cut_lines;
@@ -366,7 +367,7 @@ mod tests {
         }
     }
 
-    fn assert_simple(mesh: &ControlMesh, half_edges: &HalfEdges, blocks: &[Block]) {
+    fn assert_simple(mesh: &ControlMesh, half_edges: &QuadTopology, blocks: &[Block]) {
         let mut quads: Vec<u32> = blocks
             .iter()
             .flat_map(|b| b.cells.iter().map(|c| c.quad))
@@ -391,7 +392,7 @@ mod tests {
     fn torus_without_extraordinary_points_gives_four_blocks() {
         for (m, n, shift) in [(8, 6, 0), (3, 3, 0), (9, 7, 2), (12, 3, 5)] {
             let mesh = torus(m, n, shift);
-            let half_edges = HalfEdges::new(&mesh).expect("a valid torus");
+            let half_edges = connect(&mesh).expect("a valid torus");
             let mut cut = cut_lines(&half_edges);
             let blocks = rectangular_blocks(&mesh, &half_edges, &mut cut).expect("rectangles");
             assert_simple(&mesh, &half_edges, &blocks);
@@ -406,14 +407,12 @@ mod tests {
     #[test]
     fn rings_are_cut_across() {
         let mesh = torus(8, 6, 0);
-        let half_edges = HalfEdges::new(&mesh).expect("a valid torus");
+        let half_edges = connect(&mesh).expect("a valid torus");
         for loops in [vec![0], vec![0, 2], vec![0, 1, 5]] {
             let mut cut = vec![false; half_edges.twin.len()];
             for &at in &loops {
                 let start = (0..half_edges.len())
-                    .find(|&h| {
-                        half_edges.origin[h as usize] == at && half_edges.target(h) == at + 6
-                    })
+                    .find(|&h| half_edges.origin(h) == at && half_edges.head(h) == at + 6)
                     .expect("an edge along the loop");
                 let mut h = start;
                 for _ in 0..8 {

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::blocks::{Block, rectangular_blocks, single_quads};
-use super::half_edges::HalfEdges;
+use super::half_edges::{QuadTopology, connect};
 use super::motorcycle::cut_lines;
 use super::{Brep, BrepEdge, BrepFace, BrepUse, ControlMesh, Patch, STAGE, SplineError, volume};
 use crate::Vec3;
@@ -52,7 +52,7 @@ pub fn build_brep(
     options: &BrepOptions,
     monitor: &Monitor,
 ) -> Result<Brep, SplineError> {
-    let half_edges = HalfEdges::new(mesh)?;
+    let half_edges = connect(mesh)?;
     if patches.len() != mesh.quads.len() {
         return Err(SplineError::PatchCount {
             patches: patches.len(),
@@ -109,7 +109,7 @@ pub fn build_brep(
     let vertices = wires
         .vertices
         .iter()
-        .map(|&v| corner(patches, half_edges.first[v as usize]))
+        .map(|&v| corner(patches, half_edges.outgoing[v as usize]))
         .collect();
     let shells = shells(&faces, edges.len());
     let brep = Brep {
@@ -140,10 +140,10 @@ struct Wires {
     uses: Vec<Vec<BrepUse>>,
 }
 
-fn wires(half_edges: &HalfEdges, cut: &[bool], blocks: &[Block]) -> Result<Wires, SplineError> {
+fn wires(half_edges: &QuadTopology, cut: &[bool], blocks: &[Block]) -> Result<Wires, SplineError> {
     let mut degree = vec![0u32; half_edges.valence.len()];
     for (h, _) in cut.iter().enumerate().filter(|(_, c)| **c) {
-        degree[half_edges.origin[h] as usize] += 1;
+        degree[half_edges.origin(h as u32) as usize] += 1;
     }
     let vertices: Vec<u32> = (0..degree.len() as u32)
         .filter(|&v| degree[v as usize] != 0 && degree[v as usize] != 2)
@@ -167,8 +167,7 @@ fn wires(half_edges: &HalfEdges, cut: &[bool], blocks: &[Block]) -> Result<Wires
             let side = block.side(d);
             let mut from = 0;
             while from < side.len() {
-                let is_vertex =
-                    |h: u32| wires.number[half_edges.origin[h as usize] as usize] != u32::MAX;
+                let is_vertex = |h: u32| wires.number[half_edges.origin(h) as usize] != u32::MAX;
                 if !is_vertex(side[from]) {
                     return Err(SplineError::Inconsistent {
                         rule: "a block corner is a vertex",
@@ -269,7 +268,7 @@ fn corner(patches: &[Patch], h: u32) -> Vec3 {
     row(patches, h)[0]
 }
 
-fn edge(half_edges: &HalfEdges, patches: &[Patch], number: &[u32], chain: &[u32]) -> BrepEdge {
+fn edge(half_edges: &QuadTopology, patches: &[Patch], number: &[u32], chain: &[u32]) -> BrepEdge {
     let mut control = Vec::with_capacity(4 * chain.len() + 2);
     for (k, &h) in chain.iter().enumerate() {
         let row = row(patches, h);
@@ -278,8 +277,8 @@ fn edge(half_edges: &HalfEdges, patches: &[Patch], number: &[u32], chain: &[u32]
         control.extend_from_slice(&row[from..to]);
     }
     let ends = [
-        half_edges.origin[chain[0] as usize],
-        half_edges.target(chain[chain.len() - 1]),
+        half_edges.origin(chain[0]),
+        half_edges.head(chain[chain.len() - 1]),
     ];
     BrepEdge {
         vertices: ends.map(|v| number[v as usize]),

@@ -11,7 +11,8 @@
 use std::f64::consts::PI;
 
 use super::ControlMesh;
-use crate::Vec3;
+pub use super::half_edges::QuadTopology;
+pub use super::stencils::Stencils;
 use crate::mesh::TriMesh;
 
 /// Why a quad mesh cannot be subdivided; names the first offender.
@@ -56,214 +57,7 @@ impl CatmullClarkError {
     }
 }
 
-const LARGEST: usize = 200_000_000;
-
-/// Rows of weights over points: a sparse matrix in compressed row form, columns ascending in a row.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Stencils {
-    /// Number of points that the rows weigh (columns of the matrix).
-    pub columns: usize,
-    /// Start of each row in `indices` and `weights`; one more than rows.
-    pub offsets: Vec<usize>,
-    /// Point of each weight.
-    pub indices: Vec<u32>,
-    /// Weights.
-    pub weights: Vec<f64>,
-}
-
-impl Stencils {
-    /// No rows yet, over `columns` points.
-    pub fn new(columns: usize) -> Self {
-        Self {
-            columns,
-            offsets: vec![0],
-            indices: Vec::new(),
-            weights: Vec::new(),
-        }
-    }
-
-    /// Number of rows.
-    pub fn rows(&self) -> usize {
-        self.offsets.len() - 1
-    }
-
-    /// Points and weights of row `r`.
-    #[inline]
-    pub fn row(&self, r: usize) -> (&[u32], &[f64]) {
-        let range = self.offsets[r]..self.offsets[r + 1];
-        (&self.indices[range.clone()], &self.weights[range])
-    }
-
-    /// Appends a row; entries on the same point are added in the given order.
-    pub fn push(&mut self, entries: &mut [(u32, f64)]) {
-        entries.sort_by_key(|e| e.0);
-        let start = self.indices.len();
-        for &(index, weight) in entries.iter() {
-            if self.indices.len() > start && self.indices.last() == Some(&index) {
-                if let Some(last) = self.weights.last_mut() {
-                    *last += weight;
-                }
-            } else {
-                self.indices.push(index);
-                self.weights.push(weight);
-            }
-        }
-        self.offsets.push(self.indices.len());
-    }
-
-    /// The weighted sums of `points`, one a row.
-    pub fn apply(&self, points: &[Vec3]) -> Vec<Vec3> {
-        (0..self.rows())
-            .map(|r| self.apply_row(r, points))
-            .collect()
-    }
-
-    /// The weighted sum of row `r`.
-    #[inline]
-    pub fn apply_row(&self, r: usize, points: &[Vec3]) -> Vec3 {
-        let (indices, weights) = self.row(r);
-        let mut sum = Vec3::zeros();
-        for (&i, &w) in indices.iter().zip(weights) {
-            sum += w * points[i as usize];
-        }
-        sum
-    }
-
-    /// The product `self * other`: applies `other` first.
-    pub fn after(&self, other: &Stencils) -> Stencils {
-        let mut product = Stencils::new(other.columns);
-        let mut value = vec![0.0; other.columns];
-        let mut seen = vec![false; other.columns];
-        let mut touched: Vec<u32> = Vec::new();
-        for r in 0..self.rows() {
-            let (middle, outer) = self.row(r);
-            for (&m, &a) in middle.iter().zip(outer) {
-                let (indices, weights) = other.row(m as usize);
-                for (&i, &w) in indices.iter().zip(weights) {
-                    if !seen[i as usize] {
-                        seen[i as usize] = true;
-                        touched.push(i);
-                    }
-                    value[i as usize] += a * w;
-                }
-            }
-            touched.sort_unstable();
-            for &i in &touched {
-                product.indices.push(i);
-                product.weights.push(value[i as usize]);
-                value[i as usize] = 0.0;
-                seen[i as usize] = false;
-            }
-            touched.clear();
-            product.offsets.push(product.indices.len());
-        }
-        product
-    }
-}
-
-/// Connectivity of a closed, oriented, manifold quad mesh. Half-edge `4 q + k` runs from corner `k`
-/// of quad `q` to the next corner.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct QuadTopology {
-    /// Number of points; points without quads are allowed.
-    pub point_count: usize,
-    /// The quads.
-    pub quads: Vec<[u32; 4]>,
-    /// Opposite half-edge of every half-edge.
-    pub twin: Vec<u32>,
-    /// One outgoing half-edge a point; `u32::MAX` without quads.
-    pub outgoing: Vec<u32>,
-    /// Number of quads at each point.
-    pub valence: Vec<u32>,
-}
-
 impl QuadTopology {
-    /// Checks the mesh and links its half-edges.
-    ///
-    /// # Errors
-    /// The first quad, edge or point that is not closed, oriented and manifold.
-    pub fn new(point_count: usize, quads: &[[u32; 4]]) -> Result<Self, CatmullClarkError> {
-        let count = point_count.saturating_add(quads.len().saturating_mul(3));
-        if count > LARGEST {
-            return Err(CatmullClarkError::TooLarge {
-                count,
-                limit: LARGEST,
-            });
-        }
-        let bad = |q: &[u32; 4]| {
-            (0..4).any(|k| q[k] as usize >= point_count || q[k + 1..].contains(&q[k]))
-        };
-        if let Some(quad) = quads.iter().position(bad) {
-            return Err(CatmullClarkError::BadQuad { quad: quad as u32 });
-        }
-        let mut topology = Self {
-            point_count,
-            quads: quads.to_vec(),
-            twin: link_half_edges(quads)?,
-            outgoing: vec![u32::MAX; point_count],
-            valence: vec![0; point_count],
-        };
-        for (q, quad) in quads.iter().enumerate() {
-            for (k, &v) in quad.iter().enumerate() {
-                topology.valence[v as usize] += 1;
-                if topology.outgoing[v as usize] == u32::MAX {
-                    topology.outgoing[v as usize] = (4 * q + k) as u32;
-                }
-            }
-        }
-        for v in 0..point_count as u32 {
-            if topology.ring(v).count() != topology.valence[v as usize] as usize {
-                return Err(CatmullClarkError::Pinched { point: v });
-            }
-        }
-        Ok(topology)
-    }
-
-    /// Outgoing half-edges of `v`, counter-clockwise seen from outside.
-    pub fn ring(&self, v: u32) -> impl Iterator<Item = u32> + '_ {
-        let first = self.outgoing[v as usize];
-        let mut next = (first != u32::MAX).then_some(first);
-        std::iter::from_fn(move || {
-            let here = next?;
-            let after = self.twin[previous(here) as usize];
-            next = (after != first).then_some(after);
-            Some(here)
-        })
-    }
-
-    /// The point at the end of half-edge `h`.
-    #[inline]
-    pub fn head(&self, h: u32) -> u32 {
-        self.quads[(h / 4) as usize][((h + 1) % 4) as usize]
-    }
-
-    /// The corner of the quad of `h` opposite to the start of `h`.
-    #[inline]
-    pub fn diagonal(&self, h: u32) -> u32 {
-        self.quads[(h / 4) as usize][((h + 2) % 4) as usize]
-    }
-
-    /// One half-edge an edge, ascending, and the edge of every half-edge.
-    pub fn edges(&self) -> (Vec<u32>, Vec<u32>) {
-        let mut edges = Vec::with_capacity(self.twin.len() / 2);
-        let mut edge_of = vec![0; self.twin.len()];
-        for h in 0..self.twin.len() as u32 {
-            let twin = self.twin[h as usize];
-            if h < twin {
-                edge_of[h as usize] = edges.len() as u32;
-                edge_of[twin as usize] = edges.len() as u32;
-                edges.push(h);
-            }
-        }
-        (edges, edge_of)
-    }
-
-    /// V - E + F over the points in use.
-    pub fn euler(&self) -> i64 {
-        let vertices = self.valence.iter().filter(|&&n| n > 0).count() as i64;
-        vertices - self.quads.len() as i64
-    }
-
     /// One Catmull-Clark split: the operator and the refined connectivity.
     ///
     /// New points: the old ones, then one an edge, then one a quad. Quad `q` becomes quads
@@ -381,37 +175,6 @@ impl QuadTopology {
     }
 }
 
-/// The half-edge before `h` in its quad.
-#[inline]
-fn previous(h: u32) -> u32 {
-    h / 4 * 4 + (h + 3) % 4
-}
-
-fn link_half_edges(quads: &[[u32; 4]]) -> Result<Vec<u32>, CatmullClarkError> {
-    let mut list: Vec<([u32; 2], bool, u32)> = Vec::with_capacity(4 * quads.len());
-    for (q, quad) in quads.iter().enumerate() {
-        for k in 0..4 {
-            let (a, b) = (quad[k], quad[(k + 1) % 4]);
-            list.push(([a.min(b), a.max(b)], a > b, (4 * q + k) as u32));
-        }
-    }
-    list.sort_unstable();
-    let mut twin = vec![u32::MAX; list.len()];
-    let mut at = 0;
-    while at < list.len() {
-        let edge = list[at].0;
-        let uses = list[at..].iter().take_while(|u| u.0 == edge).count();
-        if uses != 2 || list[at].1 == list[at + 1].1 {
-            return Err(CatmullClarkError::BadEdge { edge });
-        }
-        let (h, g) = (list[at].2, list[at + 1].2);
-        twin[h as usize] = g;
-        twin[g as usize] = h;
-        at += 2;
-    }
-    Ok(twin)
-}
-
 /// The operator from control points to limit positions after `levels` splits, and the refined
 /// connectivity. Quad `q` owns the refined quads `q * 4^levels ..`.
 ///
@@ -482,6 +245,7 @@ pub fn triangles_of(quads: &[[u32; 4]], levels: u32) -> (Vec<[u32; 3]>, Vec<u32>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Vec3;
 
     fn cube() -> ControlMesh {
         let points = (0..8u32)

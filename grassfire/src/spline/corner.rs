@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use rayon::prelude::*;
 
 use super::ControlMesh;
-use super::half_edges::{HalfEdges, next};
+use super::half_edges::{QuadTopology, next};
 use crate::Vec3;
 
 /// What all patches around a point share there.
@@ -73,7 +73,7 @@ struct Ring {
 /// Computes the data of all points; see [`super::patches`] for the steps.
 pub(super) fn corner_data(
     mesh: &ControlMesh,
-    half_edges: &HalfEdges,
+    half_edges: &QuadTopology,
     twist_weight: f64,
 ) -> CornerData {
     let count = half_edges.len();
@@ -133,16 +133,16 @@ pub(super) fn corner_data(
 }
 
 /// Bicubic face point of the corner at the origin of `h`.
-fn face_point(mesh: &ControlMesh, half_edges: &HalfEdges, h: u32) -> Vec3 {
+fn face_point(mesh: &ControlMesh, half_edges: &QuadTopology, h: u32) -> Vec3 {
     let quad = &mesh.quads[h as usize / 4];
     let corner = |k: u32| mesh.points[quad[((h + k) & 3) as usize] as usize];
-    let n = f64::from(half_edges.valence[half_edges.origin[h as usize] as usize]);
+    let n = f64::from(half_edges.valence[half_edges.origin(h) as usize]);
     (corner(0) * n + (corner(1) + corner(3)) * 2.0 + corner(2)) / (n + 5.0)
 }
 
 struct Star<'a> {
     mesh: &'a ControlMesh,
-    half_edges: &'a HalfEdges,
+    half_edges: &'a QuadTopology,
     face_points: &'a [Vec3],
     edge_points: &'a [Vec3],
 }
@@ -242,7 +242,7 @@ impl Star<'_> {
     /// shares the scalar function of the edge.
     fn edge_curvature(&self, h: u32, constants: &Constants) -> f64 {
         let c = constants.cosine;
-        let slope = match self.half_edges.valence[self.half_edges.target(h) as usize] {
+        let slope = match self.half_edges.valence[self.half_edges.head(h) as usize] {
             4 => -4.0 * c,
             n => -2.0 * c - 2.0 * edge_cosine(n),
         };

@@ -6,12 +6,13 @@ mod brep;
 mod corner;
 mod error;
 mod gauss;
-mod half_edges;
+pub(crate) mod half_edges;
 mod independent;
 mod measure;
 mod motorcycle;
 mod patches;
 mod quality;
+mod stencils;
 mod tessellate;
 
 pub use bezier::{SurfacePoint, evaluate};

@@ -1,6 +1,6 @@
 //! Cutting lines of a quad mesh: few rectangular blocks without extraordinary points inside.
 
-use super::half_edges::HalfEdges;
+use super::half_edges::QuadTopology;
 use super::independent::independent_set;
 
 /// Marks half-edges (with their twins) that cut the mesh into blocks with four corners each.
@@ -15,7 +15,7 @@ use super::independent::independent_set;
 /// 3. Let all others grow from both ends at the same speed until they meet a cut.
 ///
 /// Components without extraordinary point get one artificial end: their lowest point.
-pub(super) fn cut_lines(half_edges: &HalfEdges) -> Vec<bool> {
+pub(super) fn cut_lines(half_edges: &QuadTopology) -> Vec<bool> {
     let ends = line_ends(half_edges);
     let mut cut = vec![false; half_edges.twin.len()];
     for line in chosen_lines(half_edges, &ends) {
@@ -26,13 +26,13 @@ pub(super) fn cut_lines(half_edges: &HalfEdges) -> Vec<bool> {
 }
 
 /// Marks a half-edge and its twin.
-pub(super) fn mark(half_edges: &HalfEdges, cut: &mut [bool], h: u32) {
+pub(super) fn mark(half_edges: &QuadTopology, cut: &mut [bool], h: u32) {
     cut[h as usize] = true;
     cut[half_edges.twin[h as usize] as usize] = true;
 }
 
 /// Points where lines end: all extraordinary ones, and one of every component that has none.
-fn line_ends(half_edges: &HalfEdges) -> Vec<bool> {
+fn line_ends(half_edges: &QuadTopology) -> Vec<bool> {
     let mut ends: Vec<bool> = half_edges
         .valence
         .iter()
@@ -50,7 +50,7 @@ fn line_ends(half_edges: &HalfEdges) -> Vec<bool> {
         let mut regular = true;
         while let Some(q) = stack.pop() {
             for h in 4 * q..4 * q + 4 {
-                let v = half_edges.origin[h];
+                let v = half_edges.origin(h as u32);
                 lowest = lowest.min(v);
                 regular &= half_edges.is_regular(v);
                 let other = half_edges.twin[h] as usize / 4;
@@ -67,18 +67,18 @@ fn line_ends(half_edges: &HalfEdges) -> Vec<bool> {
 }
 
 /// All straight lines between ends, each once, that are kept whole.
-fn chosen_lines(half_edges: &HalfEdges, ends: &[bool]) -> Vec<Vec<u32>> {
+fn chosen_lines(half_edges: &QuadTopology, ends: &[bool]) -> Vec<Vec<u32>> {
     let mut started = vec![false; half_edges.twin.len()];
     let mut lines: Vec<Vec<u32>> = Vec::new();
     for start in 0..half_edges.len() {
-        if started[start as usize] || !ends[half_edges.origin[start as usize] as usize] {
+        if started[start as usize] || !ends[half_edges.origin(start) as usize] {
             continue;
         }
         started[start as usize] = true;
         let mut line = vec![start];
         let mut h = start;
         // Going straight is reversible, so the line cannot run into a cycle: it comes to an end point.
-        while !ends[half_edges.target(h) as usize] {
+        while !ends[half_edges.head(h) as usize] {
             h = half_edges.ahead(h);
             line.push(h);
         }
@@ -115,16 +115,13 @@ fn chosen_lines(half_edges: &HalfEdges, ends: &[bool]) -> Vec<Vec<u32>> {
 }
 
 /// Lines that cross each line, sorted, and whether it crosses itself.
-fn crossings(half_edges: &HalfEdges, lines: &[Vec<u32>]) -> (Vec<Vec<u32>>, Vec<bool>) {
+fn crossings(half_edges: &QuadTopology, lines: &[Vec<u32>]) -> (Vec<Vec<u32>>, Vec<bool>) {
     let mut through = vec![u32::MAX; half_edges.valence.len()];
     let mut neighbours = vec![Vec::new(); lines.len()];
     let mut crosses_itself = vec![false; lines.len()];
     for (i, line) in lines.iter().enumerate() {
         for &h in &line[1..] {
-            let other = std::mem::replace(
-                &mut through[half_edges.origin[h as usize] as usize],
-                i as u32,
-            );
+            let other = std::mem::replace(&mut through[half_edges.origin(h) as usize], i as u32);
             if other == i as u32 {
                 crosses_itself[i] = true;
             } else if other != u32::MAX {
@@ -141,12 +138,12 @@ fn crossings(half_edges: &HalfEdges, lines: &[Vec<u32>]) -> (Vec<Vec<u32>>, Vec<
 }
 
 /// Extends cuts from all ends, one edge a round, until each meets another cut.
-fn grow(half_edges: &HalfEdges, ends: &[bool], cut: &mut [bool]) {
+fn grow(half_edges: &QuadTopology, ends: &[bool], cut: &mut [bool]) {
     let mut visited = ends.to_vec();
     for (h, _) in cut.iter().enumerate().filter(|(_, c)| **c) {
-        visited[half_edges.origin[h] as usize] = true;
+        visited[half_edges.origin(h as u32) as usize] = true;
     }
-    let starts = |h: &u32| ends[half_edges.origin[*h as usize] as usize] && !cut[*h as usize];
+    let starts = |h: &u32| ends[half_edges.origin(*h) as usize] && !cut[*h as usize];
     let mut fronts: Vec<u32> = (0..half_edges.len()).filter(starts).collect();
     while !fronts.is_empty() {
         let mut further = Vec::with_capacity(fronts.len());
@@ -156,7 +153,7 @@ fn grow(half_edges: &HalfEdges, ends: &[bool], cut: &mut [bool]) {
                 continue;
             }
             mark(half_edges, cut, h);
-            if !std::mem::replace(&mut visited[half_edges.target(h) as usize], true) {
+            if !std::mem::replace(&mut visited[half_edges.head(h) as usize], true) {
                 further.push(half_edges.ahead(h));
             }
         }

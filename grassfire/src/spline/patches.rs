@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::corner::{CornerData, corner_data, edge_cosine};
-use super::half_edges::{HalfEdges, next, previous};
+use super::half_edges::{QuadTopology, connect, next, previous};
 use super::quality::jacobians;
 use super::{ControlMesh, Patch, STAGE, SplineError};
 use crate::Vec3;
@@ -62,7 +62,7 @@ pub fn patches(
     options: &PatchOptions,
     monitor: &Monitor,
 ) -> Result<Vec<Patch>, SplineError> {
-    let half_edges = HalfEdges::new(mesh)?;
+    let half_edges = connect(mesh)?;
     monitor.step(STAGE, "corners", 0.0)?;
     let weight = if options.curvature_weight.is_finite() {
         options.curvature_weight.max(0.0)
@@ -110,7 +110,7 @@ struct Strip {
     second: [Vec3; 2],
 }
 
-fn strips(half_edges: &HalfEdges, corners: &CornerData) -> Vec<Strip> {
+fn strips(half_edges: &QuadTopology, corners: &CornerData) -> Vec<Strip> {
     let pairs: Vec<Option<[Strip; 2]>> = (0..half_edges.len())
         .into_par_iter()
         .map(|h| (h < half_edges.twin[h as usize]).then(|| edge_strips(half_edges, corners, h)))
@@ -126,7 +126,7 @@ fn strips(half_edges: &HalfEdges, corners: &CornerData) -> Vec<Strip> {
 }
 
 /// Strips of the quads left and right of half-edge `h`, each in the sense of its own half-edge.
-fn edge_strips(half_edges: &HalfEdges, corners: &CornerData, h: u32) -> [Strip; 2] {
+fn edge_strips(half_edges: &QuadTopology, corners: &CornerData, h: u32) -> [Strip; 2] {
     let g = half_edges.twin[h as usize];
     let tangent = |h: u32| corners.tangent[h as usize];
     let twist = |h: u32| corners.twist[h as usize];
@@ -151,9 +151,9 @@ fn edge_strips(half_edges: &HalfEdges, corners: &CornerData, h: u32) -> [Strip; 
 }
 
 /// Control points 2 and 3 of the edge curve b of `h` and of `alpha b'`, both of degree 5.
-fn boundary(half_edges: &HalfEdges, corners: &CornerData, h: u32) -> ([Vec3; 2], [Vec3; 2]) {
+fn boundary(half_edges: &QuadTopology, corners: &CornerData, h: u32) -> ([Vec3; 2], [Vec3; 2]) {
     let g = half_edges.twin[h as usize];
-    let [a, b] = [h, g].map(|h| half_edges.origin[h as usize]);
+    let [a, b] = [h, g].map(|h| half_edges.origin(h));
     let [p, q] = [a, b].map(|v| corners.position[v as usize]);
     let [s, t] = [h, g].map(|h| corners.tangent[h as usize]);
     let [bend_a, bend_b] = [h, g].map(|h| corners.bend[h as usize]);
@@ -216,7 +216,7 @@ fn raise_quartic([b, c, d]: [Vec3; 3]) -> [Vec3; 2] {
     [(b * 2.0 + c * 3.0) / 5.0, (c * 3.0 + d * 2.0) / 5.0]
 }
 
-fn patch(half_edges: &HalfEdges, corners: &CornerData, strips: &[Strip], quad: u32) -> Patch {
+fn patch(half_edges: &QuadTopology, corners: &CornerData, strips: &[Strip], quad: u32) -> Patch {
     let mut control = [[Vec3::zeros(); 6]; 6];
     for k in 0..4 {
         let h = 4 * quad + k;
@@ -231,7 +231,7 @@ fn patch(half_edges: &HalfEdges, corners: &CornerData, strips: &[Strip], quad: u
             let [i, j] = place(along, inward);
             control[i][j] = value;
         };
-        let position = corners.position[half_edges.origin[h as usize] as usize];
+        let position = corners.position[half_edges.origin(h) as usize];
         let along = corners.tangent[h as usize];
         let inward = corners.tangent[half_edges.twin[previous(h) as usize] as usize];
         let strip = &strips[h as usize];

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::bezier::{Basis, basis, visit_grid};
-use super::half_edges::HalfEdges;
+use super::half_edges::connect;
 use super::{ControlMesh, Patch, SplineError, evaluate};
 use crate::Vec3;
 
@@ -28,7 +28,7 @@ const EDGE_SAMPLES: usize = 33;
 /// # Errors
 /// As for [`super::patches`]; also when the number of patches is not that of the quads.
 pub fn g1_max(mesh: &ControlMesh, patches: &[Patch]) -> Result<G1Report, SplineError> {
-    let half_edges = HalfEdges::new(mesh)?;
+    let half_edges = connect(mesh)?;
     if patches.len() != mesh.quads.len() {
         return Err(SplineError::PatchCount {
             patches: patches.len(),

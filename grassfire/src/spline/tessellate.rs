@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::bezier::second_derivatives;
-use super::half_edges::HalfEdges;
+use super::half_edges::{QuadTopology, connect};
 use super::quality::side_parameters;
 use super::{ControlMesh, Patch, SplineError, evaluate};
 use crate::Vec3;
@@ -81,7 +81,7 @@ pub fn tessellate(
     patches: &[Patch],
     options: &TessellateOptions,
 ) -> Result<Tessellation, SplineError> {
-    let half_edges = HalfEdges::new(mesh)?;
+    let half_edges = connect(mesh)?;
     if patches.len() != mesh.quads.len() {
         return Err(SplineError::PatchCount {
             patches: patches.len(),
@@ -157,7 +157,7 @@ fn need(patch: &Patch, chord: f64, most: u32) -> [u32; 2] {
 
 /// Numbering of the mesh points: corners, then points inside edges, then points inside quads.
 struct Grid<'a> {
-    half_edges: &'a HalfEdges,
+    half_edges: &'a QuadTopology,
     /// Parts of each half-edge.
     parts: Vec<u32>,
     /// Cells along u and v of each quad.
@@ -174,7 +174,7 @@ struct Grid<'a> {
 impl<'a> Grid<'a> {
     /// Numbers the points; halves the `needs` until there are few enough triangles, which it tells.
     fn new(
-        half_edges: &'a HalfEdges,
+        half_edges: &'a QuadTopology,
         mut needs: Vec<[u32; 2]>,
         max_triangles: usize,
     ) -> (Self, bool) {
@@ -240,7 +240,7 @@ impl<'a> Grid<'a> {
         };
         samples.extend(
             self.half_edges
-                .first
+                .outgoing
                 .iter()
                 .filter(|h| **h != u32::MAX)
                 .map(|&h| on_side(h, 0.0)),
@@ -265,9 +265,9 @@ impl<'a> Grid<'a> {
     fn on_side(&self, h: u32, k: u32) -> u32 {
         let n = self.parts[h as usize];
         if k == 0 {
-            self.corner[self.half_edges.origin[h as usize] as usize]
+            self.corner[self.half_edges.origin(h) as usize]
         } else if k == n {
-            self.corner[self.half_edges.target(h) as usize]
+            self.corner[self.half_edges.head(h) as usize]
         } else if h < self.half_edges.twin[h as usize] {
             self.edge[h as usize] + k - 1
         } else {
@@ -318,7 +318,7 @@ impl<'a> Grid<'a> {
 }
 
 /// Parts of each half-edge: the larger need of its two quads; and cells of each quad.
-fn divide(half_edges: &HalfEdges, needs: &[[u32; 2]]) -> (Vec<u32>, Vec<[u32; 2]>) {
+fn divide(half_edges: &QuadTopology, needs: &[[u32; 2]]) -> (Vec<u32>, Vec<[u32; 2]>) {
     let need = |h: u32| needs[h as usize / 4][(h & 1) as usize];
     let parts: Vec<u32> = (0..half_edges.len())
         .map(|h| need(h).max(need(half_edges.twin[h as usize])))

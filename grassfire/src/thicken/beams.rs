@@ -163,16 +163,16 @@ fn transport(first: Vec3, tangents: &[Vec3]) -> Vec<Vec3> {
     frames
 }
 
-/// Four points around vertex `v`, counter-clockwise about `tangent`, the first turned by `turn` from `u`.
+/// Four points of vertex `v` around `at`, counter-clockwise about `tangent`, the first turned by `turn` from `u`.
 fn ring_points(
     complex: &Complex,
-    v: u32,
+    (v, at): (u32, Vec3),
     u: &Vec3,
     tangent: &Vec3,
     turn: f64,
     draft: &mut Draft,
 ) -> [u32; 4] {
-    let (at, radius) = (complex.at(v), complex.radii[v as usize]);
+    let radius = complex.radii[v as usize];
     let w = tangent.cross(u);
     [0.0, 1.0, 2.0, 3.0].map(|quarter| {
         let angle = turn + quarter * FRAC_PI_2;
@@ -212,14 +212,32 @@ fn add_tube(complex: &Complex, path: &[u32], start: [u32; 4], end: [u32; 4], dra
         .min_by(|&a, &b| twist(a).abs().total_cmp(&twist(b).abs()))
         .unwrap_or(0);
     let turn = twist(shift);
+    let places = places(complex, path, start.iter().any(|p| end.contains(p)));
     let mut before = start;
-    for k in 1..last {
-        let part = turn * k as f64 / last as f64;
-        let here = ring_points(complex, path[k], &frames[k], &tangents[k], part, draft);
+    for (i, &(k, at)) in places.iter().enumerate() {
+        let part = turn * (i + 1) as f64 / (places.len() + 1) as f64;
+        let here = ring_points(
+            complex,
+            (path[k], at),
+            &frames[k],
+            &tangents[k],
+            part,
+            draft,
+        );
         stitch(&before, &here, draft);
         before = here;
     }
     stitch(&before, &[0, 1, 2, 3].map(|j| end[(j + shift) % 4]), draft);
+}
+
+/// Where a tube along `path` has its sections: index into the path and centre. With a single section between two
+/// feet that share a point (`touching`), two edges of the tube could coincide: it gets two.
+fn places(complex: &Complex, path: &[u32], touching: bool) -> Vec<(usize, Vec3)> {
+    let at = |k: usize| complex.at(path[k]);
+    if touching && path.len() == 3 {
+        return [0, 2].map(|k| (1, at(1) + 0.25 * (at(k) - at(1)))).to_vec();
+    }
+    (1..path.len() - 1).map(|k| (k, at(k))).collect()
 }
 
 fn add_loop(complex: &Complex, path: &[u32], draft: &mut Draft) {
@@ -231,11 +249,12 @@ fn add_loop(complex: &Complex, path: &[u32], draft: &mut Draft) {
     let shift = (angle / FRAC_PI_2).round();
     let turn = angle - shift * FRAC_PI_2;
     debug_assert!(turn.abs() <= PI / 4.0 + 1e-9 && angle.abs() <= TAU);
-    let first = ring_points(complex, path[0], &frames[0], &tangents[0], 0.0, draft);
+    let at = |k: usize| (path[k], complex.at(path[k]));
+    let first = ring_points(complex, at(0), &frames[0], &tangents[0], 0.0, draft);
     let mut before = first;
     for k in 1..last {
         let part = turn * k as f64 / last as f64;
-        let here = ring_points(complex, path[k], &frames[k], &tangents[k], part, draft);
+        let here = ring_points(complex, at(k), &frames[k], &tangents[k], part, draft);
         stitch(&before, &here, draft);
         before = here;
     }

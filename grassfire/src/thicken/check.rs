@@ -6,6 +6,7 @@ use super::{BodyTopology, RuleCounts, ThickenError, ThickenedBody};
 use crate::Vec3;
 use crate::spline::ControlMesh;
 use crate::spline::catmull_clark::{CatmullClarkError, QuadTopology};
+use crate::spline::half_edges::{BadEdge, bad_edges};
 
 /// Step 7 of [`super::thicken`], packing and checks.
 pub(super) fn finish(
@@ -43,7 +44,7 @@ pub(super) fn finish(
         bodies: Vec::new(),
         rules,
     };
-    let topology = check_surface(&body, &vertex, complex)?;
+    let topology = check_surface(&body)?;
     body.bodies = check_bodies(complex, &body, &vertex, &topology)?;
     Ok(body)
 }
@@ -84,71 +85,64 @@ fn merge_doublets(point_count: usize, quads: &mut Vec<[u32; 4]>) -> u32 {
     merged
 }
 
-fn check_surface(
-    body: &ThickenedBody,
-    vertex: &[u32],
-    complex: &Complex,
-) -> Result<QuadTopology, ThickenError> {
-    let place = |p: u32| {
-        (
-            complex.source[vertex[p as usize] as usize],
-            body.mesh.points[p as usize],
-        )
-    };
-    let bad = |p: u32, what| {
-        let (point, place) = place(p);
-        ThickenError::BadVertex { point, place, what }
-    };
-    let topology = match QuadTopology::new(body.mesh.points.len(), &body.mesh.quads) {
-        Ok(topology) => topology,
-        Err(CatmullClarkError::BadEdge { edge }) => return Err(bad_edges(body, edge)),
-        Err(CatmullClarkError::Pinched { point }) => {
-            return Err(bad(point, "its quads form more than one fan"));
+/// Connectivity of a surface that is closed, manifold and oriented.
+pub(super) fn connect(body: &ThickenedBody) -> Result<QuadTopology, ThickenError> {
+    QuadTopology::new(body.mesh.points.len(), &body.mesh.quads).map_err(|error| match error {
+        CatmullClarkError::BadEdge { .. } => name_bad_edges(body),
+        CatmullClarkError::Pinched { point } => {
+            bad_vertex(body, point, "its quads form more than one fan")
         }
-        Err(CatmullClarkError::BadQuad { quad }) => {
-            return Err(bad(
-                body.mesh.quads[quad as usize][0],
-                "a quad there uses a point twice",
-            ));
-        }
-        Err(CatmullClarkError::TooLarge { count, .. }) => {
-            return Err(ThickenError::BadCount {
-                points: count,
-                radii: complex.radii.len(),
-            });
-        }
-    };
+        CatmullClarkError::BadQuad { quad } => bad_vertex(
+            body,
+            body.mesh.quads[quad as usize][0],
+            "a quad there uses a point twice",
+        ),
+        CatmullClarkError::TooLarge { count, .. } => ThickenError::BadCount {
+            points: count,
+            radii: body.source.len(),
+        },
+    })
+}
+
+fn check_surface(body: &ThickenedBody) -> Result<QuadTopology, ThickenError> {
+    let topology = connect(body)?;
     match topology.valence.iter().position(|&n| n < 3) {
-        Some(p) => Err(bad(p as u32, "fewer than three quads meet there")),
+        Some(p) => Err(bad_vertex(
+            body,
+            p as u32,
+            "fewer than three quads meet there",
+        )),
         None => Ok(topology),
     }
 }
 
-/// Counts the edges that are not used once in each sense; `first` is one of them.
-fn bad_edges(body: &ThickenedBody, first: [u32; 2]) -> ThickenError {
-    let mut uses: Vec<([u32; 2], bool)> = Vec::with_capacity(4 * body.mesh.quads.len());
-    for quad in &body.mesh.quads {
-        for k in 0..4 {
-            let (a, b) = (quad[k], quad[(k + 1) % 4]);
-            uses.push(([a.min(b), a.max(b)], a > b));
-        }
+fn bad_vertex(body: &ThickenedBody, p: u32, what: &'static str) -> ThickenError {
+    ThickenError::BadVertex {
+        point: body.source[p as usize],
+        place: body.mesh.points[p as usize],
+        what,
     }
-    uses.sort_unstable();
-    let count_of =
-        |e: &[([u32; 2], bool)], sense: bool| e.iter().filter(|u| u.1 == sense).count() as u32;
-    let wrong = |e: &&[([u32; 2], bool)]| count_of(e, false) != 1 || count_of(e, true) != 1;
-    let count = uses.chunk_by(|a, b| a.0 == b.0).filter(wrong).count();
-    let here: Vec<([u32; 2], bool)> = uses.iter().filter(|u| u.0 == first).copied().collect();
+}
+
+/// The error for the edges that are not used once in each sense.
+fn name_bad_edges(body: &ThickenedBody) -> ThickenError {
+    let bad = bad_edges(&body.mesh.quads);
+    let Some(&BadEdge {
+        edge: [a, b],
+        along,
+        against,
+        ..
+    }) = bad.first()
+    else {
+        return ThickenError::Empty;
+    };
+    let points = &body.mesh.points;
     ThickenError::NotManifold {
-        points: first.map(|p| body.source[p as usize]),
-        place: first
-            .iter()
-            .map(|&p| body.mesh.points[p as usize])
-            .sum::<Vec3>()
-            / 2.0,
-        along: count_of(&here, false),
-        against: count_of(&here, true),
-        count,
+        points: [a, b].map(|p| body.source[p as usize]),
+        place: (points[a as usize] + points[b as usize]) / 2.0,
+        along,
+        against,
+        count: bad.len(),
     }
 }
 
@@ -249,7 +243,7 @@ fn check_bodies(
 }
 
 /// Signed volume between `base` and quad `q`, split along its first diagonal.
-fn quad_volume(body: &ThickenedBody, q: usize, base: &Vec3) -> f64 {
+pub(super) fn quad_volume(body: &ThickenedBody, q: usize, base: &Vec3) -> f64 {
     let [a, b, c, d] = body.mesh.quads[q].map(|p| body.mesh.points[p as usize] - base);
     (a.dot(&b.cross(&c)) + a.dot(&c.cross(&d))) / 6.0
 }

@@ -2,7 +2,7 @@
 
 use super::RuleCounts;
 use super::complex::{Complex, root};
-use super::regions::{NONE, around_edge, sector_slots, unite_sides};
+use super::regions::{NONE, facing_slots, unite_sides};
 
 /// Splits every strip through an edge that has two sectors with the same regions at both ends (a
 /// one-edge seam with both ends inside a sheet): its two offsets would coincide. Returns whether
@@ -23,15 +23,9 @@ pub(super) fn split_tight_strips(complex: &mut Complex, rules: &mut RuleCounts) 
         }
     }
     let mut split = vec![false; complex.edges.len()];
-    for (e, edge) in complex
-        .edges
-        .iter()
-        .enumerate()
-        .filter(|(_, edge)| edge.uses.len() > 1)
-    {
-        let mut sectors: Vec<[usize; 2]> = around_edge(complex, edge.ends, &edge.uses)
-            .iter()
-            .map(|&u| sector_slots(complex, edge.ends, u).map(|s| root(&mut class, s)))
+    for (e, edge) in complex.edges.iter().enumerate() {
+        let mut sectors: Vec<[usize; 2]> = facing_slots(complex, edge)
+            .map(|(from, _)| from.map(|s| root(&mut class, s)))
             .collect();
         sectors.sort_unstable();
         if sectors.windows(2).any(|w| w[0] == w[1]) {

@@ -1,6 +1,7 @@
 //! The checked skeleton with its adjacency, split and refined so that every vertex has a rule.
 
 use super::chords::split_tight_strips;
+use super::sectors::sort_sectors;
 use super::{RuleCounts, STAGE, ThickenError, ThickenOptions, node, unit};
 use crate::Vec3;
 use crate::monitor::Monitor;
@@ -11,7 +12,7 @@ use crate::skeleton::Skeleton;
 pub(super) struct Edge {
     /// Lower and higher vertex.
     pub ends: [u32; 2],
-    /// Quads on it, as (quad, corner where the edge starts in the cycle of the quad).
+    /// Quads on it, as (quad, corner where the edge starts in the cycle of the quad); counter-clockwise about it.
     pub uses: Vec<(u32, u8)>,
 }
 
@@ -174,6 +175,7 @@ impl Complex {
                 unit((c - a).cross(&(d - b)))
             })
             .collect();
+        sort_sectors(self);
     }
 
     /// Position of vertex `v`.

@@ -7,6 +7,7 @@ mod chords;
 mod complex;
 mod node;
 mod regions;
+mod sectors;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -231,8 +232,8 @@ impl ThickenError {
 ///    that no ring can join is split, and the copies are tied by a short beam (same homotopy). Strips
 ///    of quads through an edge with the same region twice at both ends (one-edge seams) are split.
 /// 2. Region rule: corners of quads on the same side of the complex are united around every edge
-///    (faces sorted by angle; the side comes from the cycle of the face, never from a normal); each
-///    region gives one offset point, each group of rims another one outward.
+///    (faces sorted by angle, edges of one vertex brought into agreement where sheets run close together; the
+///    side comes from the cycle of the face, never from a normal); each region gives one offset point, each group of rims another one outward.
 /// 3. Ring rule: a vertex of plain fans and beams only, none along the axis, gets two poles and one
 ///    point between neighbours; each beam leaves through a 4-gon.
 /// 4. Polyhedron rule: any other beam node gets a rotated cube whose sides are divided until every

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::complex::{Complex, Fan, coherent_signs, root};
+use super::complex::{Complex, Edge, Fan, coherent_signs, root};
 use super::node::{self, Item, Ring};
 use super::{RuleCounts, ThickenOptions, unit};
 use crate::Vec3;
@@ -125,18 +125,33 @@ pub(super) fn offset_sheets(
 
 /// Unites the facing sides of consecutive quads around every edge.
 pub(super) fn unite_sides(complex: &Complex, class: &mut [usize]) {
-    for edge in complex.edges.iter().filter(|e| e.uses.len() > 1) {
-        let order = around_edge(complex, edge.ends, &edge.uses);
-        for (j, &(q, k)) in order.iter().enumerate() {
-            let (q2, k2) = order[(j + 1) % order.len()];
-            let from = sides_at(complex, edge.ends, (q, k), 1.0);
-            let to = sides_at(complex, edge.ends, (q2, k2), -1.0);
+    for edge in &complex.edges {
+        for (from, to) in facing_slots(complex, edge) {
             for (a, b) in from.into_iter().zip(to) {
                 let (a, b) = (root(class, a), root(class, b));
                 class[a.max(b)] = a.min(b);
             }
         }
     }
+}
+
+/// Corner sides, at the two ends of an edge, on either side of each of its sectors; a rim has none.
+pub(super) fn facing_slots<'a>(
+    complex: &'a Complex,
+    edge: &'a Edge,
+) -> impl Iterator<Item = ([usize; 2], [usize; 2])> + 'a {
+    let count = if edge.uses.len() > 1 {
+        edge.uses.len()
+    } else {
+        0
+    };
+    (0..count).map(move |j| {
+        let (quad, next) = (edge.uses[j], edge.uses[(j + 1) % count]);
+        (
+            sides_at(complex, edge.ends, quad, 1.0),
+            sides_at(complex, edge.ends, next, -1.0),
+        )
+    })
 }
 
 /// Corner sides of a quad at the two ends of an edge: the counter-clockwise ones about the edge
@@ -151,41 +166,6 @@ fn sides_at(complex: &Complex, ends: [u32; 2], (q, k): (u32, u8), turn: f64) -> 
     } else {
         [second, first]
     }
-}
-
-/// Corner sides, at the two ends of an edge, that face the sector after the given quad.
-pub(super) fn sector_slots(complex: &Complex, ends: [u32; 2], quad: (u32, u8)) -> [usize; 2] {
-    sides_at(complex, ends, quad, 1.0)
-}
-
-/// The quads on an edge, counter-clockwise about it.
-pub(super) fn around_edge(complex: &Complex, ends: [u32; 2], uses: &[(u32, u8)]) -> Vec<(u32, u8)> {
-    if uses.len() < 3 {
-        return uses.to_vec();
-    }
-    let (a, b) = (complex.at(ends[0]), complex.at(ends[1]));
-    let axis = unit(b - a);
-    let middle = (a + b) / 2.0;
-    let away = |q: u32| {
-        let d = complex.centres[q as usize] - middle;
-        unit(d - axis * d.dot(&axis))
-    };
-    let across = away(uses[0].0);
-    let up = axis.cross(&across);
-    let mut order: Vec<(f64, (u32, u8))> = uses
-        .iter()
-        .enumerate()
-        .map(|(i, &u)| {
-            let d = away(u.0);
-            let angle = d
-                .dot(&up)
-                .atan2(d.dot(&across))
-                .rem_euclid(std::f64::consts::TAU);
-            (if i == 0 { -1.0 } else { angle }, u)
-        })
-        .collect();
-    order.sort_by(|x, y| x.0.total_cmp(&y.0));
-    order.into_iter().map(|o| o.1).collect()
 }
 
 fn build_ring(

@@ -11,6 +11,7 @@
 
 mod camera;
 mod canvas;
+mod finish;
 mod legend;
 pub mod pictures;
 mod raster;

@@ -19,8 +19,6 @@ const EDGE: Rgb = [70, 78, 92];
 const RIM: Rgb = [20, 20, 24];
 const SEAM: Rgb = [214, 30, 160];
 const BEAM: Rgb = [214, 48, 39];
-/// Normals of curved surfaces are averaged below this angle, degrees.
-const CREASE: f64 = 40.0;
 
 /// One camera and one size for all pictures of a part.
 #[derive(Debug, Clone, Copy)]
@@ -67,16 +65,7 @@ impl Studio {
     pub fn thickness(&self, mesh: &TriMesh, feature_size: &[f64]) -> Result<Picture, RenderError> {
         let walls: Vec<f64> = feature_size.iter().map(|r| 2.0 * r).collect();
         let legend = Legend::spanning("wall thickness, mm", &walls, ColourMap::Viridis);
-        let colours = walls.iter().map(|t| legend.colour(*t)).collect();
-        let mesh = SceneMesh {
-            colours: Colours::Points(colours),
-            ..smooth(mesh)
-        };
-        let scene = Scene {
-            meshes: vec![mesh],
-            legend: Some(legend),
-            ..Scene::default()
-        };
+        let scene = measured(smooth(mesh), &walls, legend);
         self.shoot(
             &scene,
             "Wall thickness",
@@ -87,18 +76,8 @@ impl Studio {
     /// The medial axis: sheets coloured by radius, curves red.
     pub fn medial(&self, medial: &MedialMesh) -> Result<Picture, RenderError> {
         let legend = Legend::spanning("radius, mm", &medial.radii, ColourMap::Viridis);
-        let colours = medial.radii.iter().map(|r| legend.colour(*r)).collect();
-        let mesh = SceneMesh {
-            points: medial.points.clone(),
-            triangles: medial.triangles.clone(),
-            colours: Colours::Points(colours),
-            shading: Shading::Smooth(CREASE),
-        };
-        let mut scene = Scene {
-            meshes: vec![mesh],
-            legend: Some(legend),
-            ..Scene::default()
-        };
+        let mesh = SceneMesh::triangles(&medial.points, &medial.triangles, STEEL);
+        let mut scene = measured(mesh, &medial.radii, legend);
         scene.add_edges(&medial.points, &medial.edges, BEAM, 2.5);
         self.shoot(
             &scene,
@@ -110,16 +89,8 @@ impl Studio {
     /// The quad skeleton: rims black, seams magenta, beams red, quads coloured by radius.
     pub fn skeleton(&self, skeleton: &Skeleton) -> Result<Picture, RenderError> {
         let legend = Legend::spanning("radius, mm", &skeleton.radii, ColourMap::Viridis);
-        let colours = skeleton.radii.iter().map(|r| legend.colour(*r)).collect();
-        let mesh = SceneMesh {
-            colours: Colours::Points(colours),
-            ..SceneMesh::quads(&skeleton.points, &skeleton.quads, STEEL)
-        };
-        let mut scene = Scene {
-            meshes: vec![mesh],
-            legend: Some(legend),
-            ..Scene::default()
-        };
+        let mesh = SceneMesh::quads(&skeleton.points, &skeleton.quads, STEEL);
+        let mut scene = measured(mesh, &skeleton.radii, legend);
         for (edge, uses) in quad_edges(&skeleton.quads) {
             let (colour, width) = match uses {
                 1 => (RIM, 2.5),
@@ -184,18 +155,22 @@ impl Studio {
     /// Signed distance from the solid to the proposal, one value in voxels a point; the scale is -1..1 voxel.
     pub fn error(&self, mesh: &TriMesh, voxels: &[f64]) -> Result<Picture, RenderError> {
         let legend = Legend::symmetric("distance, voxels", 1.0);
-        let colours = voxels.iter().map(|d| legend.colour(*d)).collect();
-        let mesh = SceneMesh {
-            colours: Colours::Points(colours),
-            ..smooth(mesh)
-        };
-        let scene = Scene {
-            meshes: vec![mesh],
-            legend: Some(legend),
-            ..Scene::default()
-        };
+        let scene = measured(smooth(mesh), voxels, legend);
         let caption = "Distance from the solid to the proposal: red outside it, blue inside it.";
         self.shoot(&scene, "Deviation", caption)
+    }
+}
+
+/// A mesh coloured by one value a point.
+fn measured(mesh: SceneMesh, values: &[f64], legend: Legend) -> Scene {
+    let colours = values.iter().map(|value| legend.colour(*value)).collect();
+    Scene {
+        meshes: vec![SceneMesh {
+            colours: Colours::Points(colours),
+            ..mesh
+        }],
+        legend: Some(legend),
+        ..Scene::default()
     }
 }
 
