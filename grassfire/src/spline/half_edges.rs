@@ -347,7 +347,7 @@ mod tests {
     }
 
     fn error(mesh: &ControlMesh) -> SplineError {
-        let error = connect(mesh).err().expect("an error");
+        let error = connect(mesh).expect_err("an error");
         assert!(error.hint().is_some(), "{error}");
         error
     }
