@@ -126,6 +126,7 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
 
     let bodies = record.stage("non_design", || bodies::read(job, monitor))?;
     let proposal = record.stage("read", || inputs::proposal(job, monitor))?;
+    record.stage("read", || bodies.check_unit(proposal.bounds()))?;
     let drawn = record.stage("read", || inputs::skeleton(job, monitor))?;
     record.report.inputs = record.stage("read", || inputs::fingerprints(job, monitor))?;
     record.report.input = Some(proposal.block());
@@ -189,6 +190,7 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
             &axis,
             &shape,
             &part,
+            &bodies,
             &options.report,
             monitor,
         )

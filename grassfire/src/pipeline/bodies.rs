@@ -48,6 +48,27 @@ impl Bodies {
     }
 }
 
+/// Bodies this many times as large as the proposal are in another unit.
+const OTHER_UNIT: f64 = 5.0;
+
+impl Bodies {
+    /// Refuses bodies that are far larger than the proposal: one of the two is in another unit, and nothing would fit.
+    ///
+    /// # Errors
+    /// [`StageError::Unit`].
+    pub(super) fn check_unit(&self, proposal: Option<(Vec3, Vec3)>) -> Result<(), StageError> {
+        let size = |(lo, hi): (Vec3, Vec3)| (hi - lo).norm();
+        let (Some(bodies), Some(proposal)) = (self.surface.bounds().map(size), proposal.map(size))
+        else {
+            return Ok(());
+        };
+        if bodies > OTHER_UNIT * proposal {
+            return Err(StageError::Unit { bodies, proposal });
+        }
+        Ok(())
+    }
+}
+
 impl Region<'_> {
     pub(super) fn contains(&self, p: &Vec3) -> bool {
         let near = self
@@ -113,5 +134,36 @@ fn kept_free(bore: &cad::Bore) -> Capsule {
         a: at(from - bore.extension[0]),
         b: at(to + bore.extension[1]),
         radius: bore.radius,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bodies(size: f64) -> Bodies {
+        let corner = |x: f64, y: f64| Vec3::new(x, y, 0.0) * size;
+        Bodies {
+            surface: TriMesh {
+                points: vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)],
+                triangles: vec![[0, 1, 2]],
+                tags: Vec::new(),
+            },
+            ..Bodies::default()
+        }
+    }
+
+    #[test]
+    fn bodies_in_another_unit_are_refused_with_the_factor() {
+        let proposal = Some((Vec3::zeros(), Vec3::new(5.0, 2.5, 1.4)));
+        assert!(bodies(4.0).check_unit(proposal).is_ok());
+        assert!(Bodies::default().check_unit(proposal).is_ok());
+        let error = bodies(103.0).check_unit(proposal).expect_err("in mm");
+        let hint = super::super::PipelineError {
+            stage: "read",
+            source: error,
+        }
+        .hint();
+        assert!(hint.is_some_and(|h| h.contains("read.scale=25.4")));
     }
 }
