@@ -36,6 +36,32 @@ pub(super) struct Region<'a> {
     margin: f64,
 }
 
+#[cfg(feature = "occt")]
+impl Bodies {
+    /// Adds bodies that were recognised.
+    pub(super) fn add(&mut self, solids: Vec<NonDesignBody>) -> Result<(), StageError> {
+        let first = self.solids.len();
+        self.solids.extend(solids);
+        self.measure(first)
+    }
+
+    /// Surfaces and bores of the bodies from number `first` on.
+    fn measure(&mut self, first: usize) -> Result<(), StageError> {
+        for body in &self.solids[first..] {
+            let mesh = body
+                .solid
+                .tessellate(CHORD, FACET)
+                .map_err(cad::CadError::from)?;
+            let (points, triangles) = (&mut self.surface.points, &mut self.surface.triangles);
+            let before = points.len() as u32;
+            points.extend(mesh.points.iter().map(|p| Vec3::from(*p)));
+            triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + before)));
+            self.bores.extend(body.bores.iter().map(kept_free));
+        }
+        Ok(())
+    }
+}
+
 impl Bodies {
     /// The region within `margin` mm of the bodies or in one of their bores.
     pub(super) fn region(&self, margin: f64) -> Region<'_> {
@@ -57,15 +83,21 @@ impl Bodies {
     /// # Errors
     /// [`StageError::Unit`].
     pub(super) fn check_unit(&self, proposal: Option<(Vec3, Vec3)>) -> Result<(), StageError> {
-        let size = |(lo, hi): (Vec3, Vec3)| (hi - lo).norm();
-        let (Some(bodies), Some(proposal)) = (self.surface.bounds().map(size), proposal.map(size))
-        else {
-            return Ok(());
-        };
-        if bodies > OTHER_UNIT * proposal {
-            return Err(StageError::Unit { bodies, proposal });
+        check_unit(&self.surface, proposal)
+    }
+}
+
+/// Refuses a CAD surface that is far larger than the proposal.
+pub(super) fn check_unit(
+    surface: &TriMesh,
+    proposal: Option<(Vec3, Vec3)>,
+) -> Result<(), StageError> {
+    let size = |(lo, hi): (Vec3, Vec3)| (hi - lo).norm();
+    match (surface.bounds().map(size), proposal.map(size)) {
+        (Some(bodies), Some(proposal)) if bodies > OTHER_UNIT * proposal => {
+            Err(StageError::Unit { bodies, proposal })
         }
-        Ok(())
+        _ => Ok(()),
     }
 }
 
@@ -97,22 +129,7 @@ pub(super) fn read(job: &ReconstructJob, monitor: &Monitor) -> Result<Bodies, St
         };
         bodies.solids.extend(solids);
     }
-    for body in &bodies.solids {
-        let surface = body
-            .solid
-            .tessellate(CHORD, FACET)
-            .map_err(cad::CadError::from)?;
-        let first = bodies.surface.points.len() as u32;
-        bodies
-            .surface
-            .points
-            .extend(surface.points.iter().map(|p| Vec3::from(*p)));
-        bodies
-            .surface
-            .triangles
-            .extend(surface.triangles.iter().map(|t| t.map(|v| v + first)));
-        bodies.bores.extend(body.bores.iter().map(kept_free));
-    }
+    bodies.measure(0)?;
     Ok(bodies)
 }
 

@@ -60,9 +60,11 @@ pub enum StageError {
     #[error("{} cannot be united: this build has no OpenCASCADE", path.display())]
     NoKernel { path: PathBuf },
     #[error(
-        "the non-design bodies are {bodies:.4} mm across, the proposal only {proposal:.4} mm: they are in different units"
+        "the CAD bodies given are {bodies:.4} mm across, the proposal only {proposal:.4} mm: they are in different units"
     )]
     Unit { bodies: f64, proposal: f64 },
+    #[error("{} is no STEP file; a design space must be given as STEP", path.display())]
+    DesignSpace { path: PathBuf },
     #[error("retry.quad_sizes is empty: no quad size to try")]
     NoQuadSize,
 }
@@ -75,7 +77,7 @@ impl PipelineError {
         }
         match self.source {
             StageError::Io(_) | StageError::Repair(_) | StageError::Remesh(_) => 2,
-            _ if matches!(self.stage, "read" | "non_design") => 2,
+            _ if matches!(self.stage, "read" | "non_design" | "recognise") => 2,
             _ => 3,
         }
     }
@@ -102,6 +104,7 @@ impl PipelineError {
                 Some("build with the default feature occt, or leave out --non-design".into())
             }
             StageError::Unit { bodies, proposal } => Some(unit_hint(bodies / proposal)),
+            StageError::DesignSpace { .. } => Some("export it from CAD as STEP".into()),
             StageError::NoQuadSize => {
                 Some("give at least one factor, such as retry.quad_sizes=[1.0]".into())
             }

@@ -157,6 +157,7 @@ pub(super) fn fingerprints(
 ) -> Result<Vec<InputFile>, StageError> {
     let paths = std::iter::once(&job.part)
         .chain(&job.non_design)
+        .chain(&job.design_space)
         .chain(&job.skeleton);
     paths.map(|path| fingerprint(path, monitor)).collect()
 }
