@@ -177,8 +177,18 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
     })?;
     let intersections = shape.fitted.self_intersections.len();
     let part = record.stage("cad", || {
-        union::part(&surface, &bodies, intersections, voxel, options, monitor)
+        union::part(
+            &surface,
+            &mut bodies,
+            intersections,
+            voxel,
+            options,
+            monitor,
+        )
     })?;
+    if part.non_design.is_empty() {
+        recognise::left_out(&mut record.report.candidates);
+    }
     record.report.solid = part.block.clone();
     record.report.non_design = part.non_design.clone();
     record.stage("write", || {

@@ -10,9 +10,10 @@ pub enum RecogniseMode {
     /// Nothing is looked for.
     Off,
     /// They are listed in the report.
-    #[default]
     List,
-    /// They are listed; without `--non-design` bodies, those that can be solids are united with the part.
+    /// They are listed; without `--non-design` bodies, those that can be solids are united with the part. When that
+    /// union fails, the part is made without them and the report says so.
+    #[default]
     Auto,
 }
 

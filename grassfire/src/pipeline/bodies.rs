@@ -27,6 +27,8 @@ pub(super) struct Bodies {
     pub(super) surface: TriMesh,
     /// Their bores with the length that is kept free.
     pub(super) bores: Vec<Capsule>,
+    /// Nobody gave them: the part may be made without them.
+    pub(super) recognised: bool,
 }
 
 /// Tells whether a point belongs to the non-design region, where the proposal is not the reference.

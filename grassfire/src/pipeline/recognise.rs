@@ -15,6 +15,8 @@ use crate::remesh::default_voxel;
 use crate::report::{CandidateBlock, DesignFaceBlock};
 
 const STAGE: &str = "recognise";
+/// A hollow that turns by more than this is worth a word why it is no boss, radians.
+const HALF_TURN: f64 = std::f64::consts::PI;
 
 /// The tables of the report.
 #[derive(Default)]
@@ -66,6 +68,7 @@ pub(super) fn recognise(
     } else {
         Vec::new()
     };
+    bodies.recognised = unite;
     let listed = options.non_design.recognition.max_listed;
     found.candidates = table(&recognised, &united, unite, listed);
     Ok(found)
@@ -225,6 +228,14 @@ fn design_space(
     })
 }
 
+/// Marks the table when the recognised bodies were left out in the end.
+pub(super) fn left_out(candidates: &mut [CandidateBlock]) {
+    for row in candidates.iter_mut().filter(|row| row.used) {
+        row.used = false;
+        row.reason = Some("no valid union with the part".to_owned());
+    }
+}
+
 /// Bosses first, then the holes that are none, then the largest other surfaces.
 fn table(found: &Recognised, united: &[usize], unite: bool, most: usize) -> Vec<CandidateBlock> {
     let mut rows = Vec::new();
@@ -247,15 +258,15 @@ fn table(found: &Recognised, united: &[usize], unite: bool, most: usize) -> Vec<
             ..row(&found.candidates[boss.bore])
         });
     }
-    for (bore, reason) in &found.rejected {
+    let holes = |(bore, _): &&(usize, String)| found.candidates[*bore].angle > HALF_TURN;
+    for (bore, reason) in found.rejected.iter().filter(holes) {
         done[*bore] = true;
-        if rows.len() < most {
-            rows.push(CandidateBlock {
-                reason: Some(reason.clone()),
-                ..row(&found.candidates[*bore])
-            });
-        }
+        rows.push(CandidateBlock {
+            reason: Some(reason.clone()),
+            ..row(&found.candidates[*bore])
+        });
     }
+    rows.truncate(most.max(found.bosses.len()));
     let others = (0..done.len()).filter(|&i| !done[i]);
     let room = most.saturating_sub(rows.len());
     rows.extend(others.take(room).map(|i| row(&found.candidates[i])));

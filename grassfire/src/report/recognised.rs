@@ -19,8 +19,8 @@ pub(super) fn section(report: &Report) -> Markup {
 fn candidates(rows: &[CandidateBlock]) -> Markup {
     html! {
         h2 { "Recognised surfaces" }
-        p .soft { "Found in the proposal alone. A boss is a through bore with the sleeve of material around it; "
-            "set non_design.recognise=auto to unite bosses with the part." }
+        p .soft { "Found in the proposal alone. A boss is a through bore with the sleeve of material around it. "
+            "With --recognise list, or with --non-design bodies, bosses are only listed." }
         div .scroll { table {
             thead { tr { th { "Kind" } th .n { "Radius" } th .n { "Outer radius" } th .n { "Length" } th .n { "Angle" }
                 th .n { "Covered" } th .n { "Deviation, rms" } th { "Middle, mm" } th { "" } } }
