@@ -60,6 +60,12 @@ pub struct ReconstructArgs {
     /// Body that must be in the solid as given (STEP or STL); may be repeated
     #[arg(long, value_name = "FILE")]
     pub non_design: Vec<PathBuf>,
+    /// Design space (STEP): faces of it that the part still follows are recognised as non-design
+    #[arg(long, value_name = "FILE")]
+    pub design_space: Option<PathBuf>,
+    /// What to do with bores and bosses recognised in the part (non_design.recognise)
+    #[arg(long, value_enum, value_name = "MODE")]
+    pub recognise: Option<Recognise>,
     /// Quad skeleton to use instead of our own (PLY or OBJ)
     #[arg(long, value_name = "FILE")]
     pub skeleton: Option<PathBuf>,
@@ -81,6 +87,17 @@ pub struct ReconstructArgs {
     /// What all runs share.
     #[command(flatten)]
     pub run: RunArgs,
+}
+
+/// What is done with recognised non-design bodies.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Recognise {
+    /// Look for nothing
+    Off,
+    /// List them in the report
+    List,
+    /// List them; without --non-design, unite them with the part
+    Auto,
 }
 
 /// Arguments of `demo`.

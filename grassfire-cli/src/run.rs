@@ -10,7 +10,7 @@ use grassfire::monitor::Monitor;
 use grassfire::pipeline::{Outcome, ReconstructJob, ReconstructOptions, reconstruct};
 use grassfire::report;
 
-use crate::args::{DemoArgs, Example, ReconstructArgs, RunArgs};
+use crate::args::{DemoArgs, Example, Recognise, ReconstructArgs, RunArgs};
 use crate::failure::{Failure, chain};
 use crate::progress::{Bar, Shared, Talk};
 use crate::{settings, summary};
@@ -25,9 +25,18 @@ pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
     );
     short.extend(args.iso.map(|value| ("read.threshold", value.to_string())));
     short.extend(args.strict.then(|| ("repair.strict", "true".to_owned())));
+    short.extend(args.recognise.map(|mode| {
+        let mode = match mode {
+            Recognise::Off => "off",
+            Recognise::List => "list",
+            Recognise::Auto => "auto",
+        };
+        ("non_design.recognise", mode.to_owned())
+    }));
     let job = ReconstructJob {
         part: args.part.clone(),
         non_design: args.non_design.clone(),
+        design_space: args.design_space.clone(),
         skeleton: args.skeleton.clone(),
         output: args.output.clone(),
         command: command_line(),
@@ -65,6 +74,7 @@ pub fn demo_command(args: &DemoArgs) -> Result<u8, Failure> {
     let job = ReconstructJob {
         part,
         non_design,
+        design_space: None,
         skeleton: None,
         output,
         command,

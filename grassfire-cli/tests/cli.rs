@@ -86,19 +86,23 @@ fn reconstruct_help_is_complete() {
       <PART>  Mesh (STL, OBJ, PLY, OFF, 3MF) or density (VTI, VTU, NPY)
 
     Options:
-          --non-design <FILE>  Body that must be in the solid as given (STEP or STL); may be repeated
-          --skeleton <FILE>    Quad skeleton to use instead of our own (PLY or OBJ)
-          --voxel <MM>         Edge of a voxel, mm (remesh.voxel)
-          --quad-size <MM>     Edge of a skeleton quad, mm (skeleton.quad_size)
-          --iso <VALUE>        Density at which material begins (read.threshold)
-          --strict             Refuse a mesh that needs repair (repair.strict)
-      -o, --output <DIR>       Folder for the results; made when missing
-          --set <KEY=VALUE>    Sets any option, such as remesh.min_tunnel=0; may be repeated
-          --threads <N>        Threads; 0 takes all cores
-          --json               Print report.json on stdout
-      -q, --quiet              No progress, warnings or summary
-      -v, --verbose            Say when each stage ends and how long it took
-      -h, --help               Print help
+          --non-design <FILE>    Body that must be in the solid as given (STEP or STL); may be repeated
+          --design-space <FILE>  Design space (STEP): faces of it that the part still follows are
+                                 recognised as non-design
+          --recognise <MODE>     What to do with bores and bosses recognised in the part
+                                 (non_design.recognise) [possible values: off, list, auto]
+          --skeleton <FILE>      Quad skeleton to use instead of our own (PLY or OBJ)
+          --voxel <MM>           Edge of a voxel, mm (remesh.voxel)
+          --quad-size <MM>       Edge of a skeleton quad, mm (skeleton.quad_size)
+          --iso <VALUE>          Density at which material begins (read.threshold)
+          --strict               Refuse a mesh that needs repair (repair.strict)
+      -o, --output <DIR>         Folder for the results; made when missing
+          --set <KEY=VALUE>      Sets any option, such as remesh.min_tunnel=0; may be repeated
+          --threads <N>          Threads; 0 takes all cores
+          --json                 Print report.json on stdout
+      -q, --quiet                No progress, warnings or summary
+      -v, --verbose              Say when each stage ends and how long it took
+      -h, --help                 Print help
 
     Examples:
       grassfire reconstruct part.stl -o out

@@ -82,19 +82,20 @@ rust::String faults(const Shape& shape);
 Counts counts(const Shape& shape);
 std::unique_ptr<Shape> solid(const Shape& shape, size_t index);
 double volume(const Shape& shape, double eps);
+rust::Vec<double> face_volumes(const Shape& shape, double eps, const Shape& known, rust::Slice<const double> known_volumes);
 double area(const Shape& shape, double eps);
 double max_tolerance(const Shape& shape);
 rust::Vec<FaceInfo> faces(const Shape& shape);
 rust::Vec<EdgeInfo> edges(const Shape& shape);
 rust::Vec<double> bounds(const Shape& shape);
 rust::Vec<LineHit> line_hits(const Shape& shape, rust::Slice<const double> lines);
-bool contains(const Shape& shape, rust::Slice<const double> point);
+rust::Vec<uint8_t> contains(const Shape& shape, rust::Slice<const double> points);
 rust::Vec<double> distances(const Shape& shape, rust::Slice<const double> points);
 rust::Vec<double> face_samples(const Shape& shape, rust::Slice<const uint32_t> faces, size_t per_face);
 
 // exchange.cpp
 std::unique_ptr<Shape> read_step(rust::Str path);
 void write_step(const Shape& shape, rust::Str path, const StepNames& names);
-Triangulation tessellate(const Shape& shape, double chord, double angle);
+Triangulation tessellate(const Shape& shape, double chord, double angle, rust::Slice<const uint32_t> fine, double fine_chord, double fine_angle);
 
 }  // namespace grassfire

@@ -2,6 +2,7 @@
 #include "grassfire-occt/cpp/bridge.h"
 #include "grassfire-occt/src/ffi.rs.h"
 
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <stdexcept>
@@ -9,6 +10,7 @@
 #include <APIHeaderSection_MakeHeader.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRepTools.hxx>
+#include <BRep_Builder.hxx>
 #include <BRep_Tool.hxx>
 #include <IFSelect_ReturnStatus.hxx>
 #include <Interface_Static.hxx>
@@ -27,6 +29,7 @@
 #include <TopTools_IndexedMapOfShape.hxx>
 #include <Transfer_FinderProcess.hxx>
 #include <TopoDS.hxx>
+#include <TopoDS_Compound.hxx>
 #include <TopoDS_Edge.hxx>
 #include <TopoDS_Face.hxx>
 #include <TopoDS_Vertex.hxx>
@@ -116,6 +119,15 @@ void join_edges(const TopTools_IndexedMapOfShape& faces, const std::vector<size_
   }
 }
 
+// Number of the first face that has no triangles, from 1; 0 when all have.
+int without_triangles(const TopTools_IndexedMapOfShape& faces) {
+  for (int f = 1; f <= faces.Extent(); ++f) {
+    TopLoc_Location place;
+    if (BRep_Tool::Triangulation(TopoDS::Face(faces(f)), place).IsNull()) return f;
+  }
+  return 0;
+}
+
 }  // namespace
 
 std::unique_ptr<Shape> read_step(rust::Str path) {
@@ -146,17 +158,30 @@ void write_step(const Shape& s, rust::Str path, const StepNames& names) {
   if (writer.Write(std::string(path).c_str()) != IFSelect_RetDone) throw std::runtime_error("the STEP file could not be written");
 }
 
-Triangulation tessellate(const Shape& s, double chord, double angle) {
-  BRepTools::Clean(s.shape);
-  BRepMesh_IncrementalMesh(s.shape, chord, false, angle, false);
+// The faces `fine` first, finer; then the rest, which takes over the points on shared edges. A face that the mesher gives
+// up on is tried again with all others at a smaller chord: neighbours must agree on the points of their edges.
+Triangulation tessellate(const Shape& s, double chord, double angle, rust::Slice<const uint32_t> fine, double fine_chord, double fine_angle) {
   TopTools_IndexedMapOfShape faces;
   TopExp::MapShapes(s.shape, TopAbs_FACE, faces);
+  TopoDS_Compound first;
+  BRep_Builder builder;
+  builder.MakeCompound(first);
+  for (uint32_t f : fine) builder.Add(first, faces.FindKey(int(f) + 1));
+  constexpr int tries = 4;
+  for (int k = 0; k < tries; ++k) {
+    BRepTools::Clean(s.shape);
+    const double factor = std::pow(0.5, k);
+    if (fine.size() > 0) BRepMesh_IncrementalMesh(first, factor * fine_chord, false, fine_angle, false);
+    BRepMesh_IncrementalMesh(s.shape, factor * chord, false, angle, false);
+    const int missing = without_triangles(faces);
+    if (missing == 0) break;
+    if (k + 1 == tries) throw std::runtime_error("face " + std::to_string(missing - 1) + " could not be triangulated");
+  }
   std::vector<size_t> first_node;
   size_t total = 0;
   for (int f = 1; f <= faces.Extent(); ++f) {
     TopLoc_Location place;
     const Handle(Poly_Triangulation)& mesh = BRep_Tool::Triangulation(TopoDS::Face(faces(f)), place);
-    if (mesh.IsNull()) throw std::runtime_error("face " + std::to_string(f - 1) + " could not be triangulated");
     first_node.push_back(total);
     total += size_t(mesh->NbNodes());
   }

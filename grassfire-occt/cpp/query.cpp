@@ -8,6 +8,7 @@
 #include <map>
 #include <sstream>
 #include <stdexcept>
+#include <vector>
 
 #include <BRepAdaptor_Curve.hxx>
 #include <BRepAdaptor_Surface.hxx>
@@ -19,6 +20,9 @@
 #include <BRepClass3d_SolidClassifier.hxx>
 #include <BRepExtrema_DistShapeShape.hxx>
 #include <BRepGProp.hxx>
+#include <BRepGProp_Domain.hxx>
+#include <BRepGProp_Face.hxx>
+#include <BRepGProp_Vinert.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRepTools.hxx>
 #include <BRepTopAdaptor_FClass2d.hxx>
@@ -178,6 +182,34 @@ double volume(const Shape& s, double eps) {
   return props.Mass();
 }
 
+// What each face adds to the volume: the signed cone over it from the middle of the box around `known`. A face that is
+// also in `known` (the same face in the same place, not an equal one) is not integrated again.
+rust::Vec<double> face_volumes(const Shape& s, double eps, const Shape& known, rust::Slice<const double> known_volumes) {
+  TopTools_IndexedMapOfShape faces, before;
+  TopExp::MapShapes(s.shape, TopAbs_FACE, faces);
+  TopExp::MapShapes(known.shape, TopAbs_FACE, before);
+  Bnd_Box box;
+  BRepBndLib::Add(known.shape, box, false);
+  gp_Pnt apex;
+  if (!box.IsVoid()) apex = gp_Pnt((box.CornerMin().XYZ() + box.CornerMax().XYZ()) / 2.);
+  rust::Vec<double> out;
+  for (int i = 1; i <= faces.Extent(); ++i) {
+    const int at = before.FindIndex(faces(i));
+    if (at > 0 && size_t(at) <= known_volumes.size()) {
+      const double volume = known_volumes[size_t(at) - 1];
+      out.push_back(before(at).Orientation() == faces(i).Orientation() ? volume : -volume);
+      continue;
+    }
+    BRepGProp_Face face(TopoDS::Face(faces(i)));
+    BRepGProp_Domain domain(TopoDS::Face(faces(i)));
+    BRepGProp_Vinert cone;
+    cone.SetLocation(apex);
+    cone.Perform(face, domain, eps);
+    out.push_back(cone.Mass());
+  }
+  return out;
+}
+
 double area(const Shape& s, double eps) {
   GProp_GProps props;
   BRepGProp::SurfaceProperties(s.shape, props, eps, false);
@@ -275,12 +307,21 @@ rust::Vec<LineHit> line_hits(const Shape& s, rust::Slice<const double> lines) {
   return out;
 }
 
-bool contains(const Shape& s, rust::Slice<const double> p) {
+// 1 for each point that lies strictly inside one of the solids.
+rust::Vec<uint8_t> contains(const Shape& s, rust::Slice<const double> points) {
+  const size_t n = points.size() / 3;
+  std::vector<uint8_t> in(n, 0);
   for (TopExp_Explorer at(s.shape, TopAbs_SOLID); at.More(); at.Next()) {
-    BRepClass3d_SolidClassifier classifier(at.Current(), gp_Pnt(p[0], p[1], p[2]), 1e-7);
-    if (classifier.State() == TopAbs_IN) return true;
+    BRepClass3d_SolidClassifier classifier(at.Current());
+    for (size_t i = 0; i < n; ++i) {
+      if (in[i]) continue;
+      classifier.Perform(gp_Pnt(points[3 * i], points[3 * i + 1], points[3 * i + 2]), 1e-7);
+      in[i] = classifier.State() == TopAbs_IN;
+    }
   }
-  return false;
+  rust::Vec<uint8_t> out;
+  for (uint8_t flag : in) out.push_back(flag);
+  return out;
 }
 
 rust::Vec<double> distances(const Shape& s, rust::Slice<const double> points) {

@@ -133,18 +133,31 @@ pub(crate) mod bridge {
         fn counts(shape: &Shape) -> Result<Counts>;
         fn solid(shape: &Shape, index: usize) -> Result<UniquePtr<Shape>>;
         fn volume(shape: &Shape, eps: f64) -> Result<f64>;
+        fn face_volumes(
+            shape: &Shape,
+            eps: f64,
+            known: &Shape,
+            known_volumes: &[f64],
+        ) -> Result<Vec<f64>>;
         fn area(shape: &Shape, eps: f64) -> Result<f64>;
         fn max_tolerance(shape: &Shape) -> Result<f64>;
         fn faces(shape: &Shape) -> Result<Vec<FaceInfo>>;
         fn edges(shape: &Shape) -> Result<Vec<EdgeInfo>>;
         fn bounds(shape: &Shape) -> Result<Vec<f64>>;
         fn line_hits(shape: &Shape, lines: &[f64]) -> Result<Vec<LineHit>>;
-        fn contains(shape: &Shape, point: &[f64]) -> Result<bool>;
+        fn contains(shape: &Shape, points: &[f64]) -> Result<Vec<u8>>;
         fn distances(shape: &Shape, points: &[f64]) -> Result<Vec<f64>>;
         fn face_samples(shape: &Shape, faces: &[u32], per_face: usize) -> Result<Vec<f64>>;
 
         fn read_step(path: &str) -> Result<UniquePtr<Shape>>;
         fn write_step(shape: &Shape, path: &str, names: &StepNames) -> Result<()>;
-        fn tessellate(shape: &Shape, chord: f64, angle: f64) -> Result<Triangulation>;
+        fn tessellate(
+            shape: &Shape,
+            chord: f64,
+            angle: f64,
+            fine: &[u32],
+            fine_chord: f64,
+            fine_angle: f64,
+        ) -> Result<Triangulation>;
     }
 }

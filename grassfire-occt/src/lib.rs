@@ -286,6 +286,17 @@ impl Shape {
         Ok(bridge::volume(&self.0, eps)?)
     }
 
+    /// What each face adds to the volume, mm3: the signed cone over it from a point in the middle of `known`, to the relative
+    /// accuracy `eps`. The sum is the volume.
+    ///
+    /// Faces of `self` that are faces of `known` too (the same ones, as booleans leave what they do not touch) take their
+    /// value from there.
+    pub fn face_volumes(&self, eps: f64, known: Option<(&Shape, &[f64])>) -> Result<Vec<f64>> {
+        let (shape, values) = known.unwrap_or((self, &[]));
+        let _guard = lock();
+        Ok(bridge::face_volumes(&self.0, eps, &shape.0, values)?)
+    }
+
     /// Surface area to the relative accuracy `eps`, mm2.
     pub fn area(&self, eps: f64) -> Result<f64> {
         let _guard = lock();
@@ -335,11 +346,12 @@ impl Shape {
         Ok(out)
     }
 
-    /// Whether the point lies strictly inside one of the solids.
-    pub fn contains(&self, point: [f64; 3]) -> Result<bool> {
-        check_finite(&point)?;
+    /// Tells for each point whether it lies strictly inside one of the solids.
+    pub fn contains(&self, points: &[[f64; 3]]) -> Result<Vec<bool>> {
+        check_finite(points.as_flattened())?;
         let _guard = lock();
-        Ok(bridge::contains(&self.0, &point)?)
+        let inside = bridge::contains(&self.0, points.as_flattened())?;
+        Ok(inside.into_iter().map(|flag| flag != 0).collect())
     }
 
     /// Distance of each point to the nearest face, mm.
@@ -359,13 +371,31 @@ impl Shape {
     /// Triangles within `chord` mm of the surfaces whose neighbours on one face differ by at most `angle`.
     ///
     /// Watertight by construction: nodes are joined along shared edges by position in the edge, not by distance.
+    ///
+    /// # Errors
+    /// When the mesher gives up on a face at this and three smaller chords.
     pub fn tessellate(&self, chord: f64, angle: f64) -> Result<Triangulation> {
-        check_finite(&[chord, angle])?;
-        if chord <= 0.0 || angle <= 0.0 {
+        self.tessellate_finer([chord, angle], &[], [chord, angle])
+    }
+
+    /// As [`Shape::tessellate`] with chord and angle `coarse`, but the faces `fine` with `finer`.
+    pub fn tessellate_finer(
+        &self,
+        coarse: [f64; 2],
+        fine: &[u32],
+        finer: [f64; 2],
+    ) -> Result<Triangulation> {
+        let all = [coarse, finer];
+        check_finite(all.as_flattened())?;
+        if all.as_flattened().iter().any(|x| *x <= 0.0) {
             return Err(OcctError("chord and angle must be positive".into()));
         }
+        let faces = self.counts()?.faces;
+        if fine.iter().any(|f| *f >= faces) {
+            return Err(OcctError("there is no such face".into()));
+        }
         let _guard = lock();
-        let flat = bridge::tessellate(&self.0, chord, angle)?;
+        let flat = bridge::tessellate(&self.0, coarse[0], coarse[1], fine, finer[0], finer[1])?;
         Ok(Triangulation {
             points: flat
                 .points

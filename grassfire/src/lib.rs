@@ -16,6 +16,7 @@ pub mod cad;
 pub mod fit;
 pub mod io;
 pub mod medial;
+pub mod non_design;
 pub mod pipeline;
 pub mod radii;
 pub mod remesh;

@@ -8,6 +8,7 @@ mod error;
 mod illustrate;
 mod inputs;
 mod measure;
+mod recognise;
 mod record;
 mod shape;
 mod union;
@@ -85,6 +86,8 @@ pub struct ReconstructJob {
     pub part: PathBuf,
     /// Bodies to unite with the result as they are (STEP or STL).
     pub non_design: Vec<PathBuf>,
+    /// The design space as STEP: its faces that the proposal still follows are non-design.
+    pub design_space: Option<PathBuf>,
     /// A quad skeleton drawn elsewhere, in place of ours.
     pub skeleton: Option<PathBuf>,
     /// Folder for all results; made when it does not exist.
@@ -106,7 +109,7 @@ pub struct Outcome {
 
 /// Turns a proposal into a checked CAD solid and a report.
 ///
-/// 1. Reads the proposal and the non-design bodies; repairs the mesh.
+/// 1. Reads the proposal and the non-design bodies; repairs the mesh; recognises bores and bosses in it.
 /// 2. Remeshes it on voxels to a closed solid and removes topological noise.
 /// 3. Computes wall thickness (poles) and the pruned medial axis.
 /// 4. Builds the quad skeleton (or reads the given one), maps and smooths its radii.
@@ -124,11 +127,17 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
     let options = &job.options;
     let mut record = Record::start(&job.command);
 
-    let bodies = record.stage("non_design", || bodies::read(job, monitor))?;
+    let mut bodies = record.stage("non_design", || bodies::read(job, monitor))?;
     let proposal = record.stage("read", || inputs::proposal(job, monitor))?;
+    record.stage("read", || bodies.check_unit(proposal.bounds()))?;
     let drawn = record.stage("read", || inputs::skeleton(job, monitor))?;
     record.report.inputs = record.stage("read", || inputs::fingerprints(job, monitor))?;
     record.report.input = Some(proposal.block());
+    let recognised = record.stage("recognise", || {
+        recognise::recognise(job, &proposal, &mut bodies, monitor)
+    })?;
+    record.report.candidates = recognised.candidates;
+    record.report.design_space = recognised.faces;
 
     let remeshed = record.stage("remesh", || {
         inputs::remesh(&proposal, &bodies, options, monitor)
@@ -168,8 +177,18 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
     })?;
     let intersections = shape.fitted.self_intersections.len();
     let part = record.stage("cad", || {
-        union::part(&surface, &bodies, intersections, voxel, options, monitor)
+        union::part(
+            &surface,
+            &mut bodies,
+            intersections,
+            voxel,
+            options,
+            monitor,
+        )
     })?;
+    if part.non_design.is_empty() {
+        recognise::left_out(&mut record.report.candidates);
+    }
     record.report.solid = part.block.clone();
     record.report.non_design = part.non_design.clone();
     record.stage("write", || {
@@ -189,6 +208,7 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
             &axis,
             &shape,
             &part,
+            &bodies,
             &options.report,
             monitor,
         )

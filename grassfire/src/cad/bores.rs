@@ -168,19 +168,19 @@ fn same_hole(a: &Bore, b: &Bore) -> bool {
 
 fn open_ends(bore: &Bore, shape: &Shape) -> Result<[bool; 2], OcctError> {
     let beyond = PROBE * bore.radius;
-    let mut open = [true; 2];
-    for (end, t) in [bore.extent[0] - beyond, bore.extent[1] + beyond]
-        .into_iter()
-        .enumerate()
-    {
-        for line in bore.lines([0.0, 1.0]) {
-            if shape.contains(array(Vec3::from(line.point) + bore.direction * t))? {
-                open[end] = false;
-                break;
-            }
-        }
+    let ends = [bore.extent[0] - beyond, bore.extent[1] + beyond];
+    let mut points = Vec::new();
+    for t in ends {
+        let lines = bore.lines([0.0, 1.0]);
+        points.extend(
+            lines
+                .iter()
+                .map(|line| array(Vec3::from(line.point) + bore.direction * t)),
+        );
     }
-    Ok(open)
+    let inside = shape.contains(&points)?;
+    let (first, second) = inside.split_at(points.len() / 2);
+    Ok([first, second].map(|end| !end.contains(&true)))
 }
 
 /// Sets the extensions of open ends to `factor` radii, less where a line along the hole meets one of `obstacles` before.

@@ -204,6 +204,8 @@ pub(super) struct Body {
     pub(super) shape: Shape,
     pub(super) solids: u32,
     pub(super) volume: f64,
+    /// What each face adds to the volume, mm3; empty when the shape was moved since.
+    pub(super) face_volumes: Vec<f64>,
     pub(super) problems: Vec<String>,
 }
 
@@ -212,7 +214,8 @@ impl Body {
         patches::check(brep).map_err(|text| CadError::BadBrep { text })?;
         let solids = shells::classify(brep)?;
         let shape = Shape::from_brep(&describe(brep, &solids))?;
-        let volume = shape.volume(VOLUME_EPS)?;
+        let face_volumes = shape.face_volumes(VOLUME_EPS, None)?;
+        let volume = face_volumes.iter().sum::<f64>();
         let mut problems = Vec::new();
         if let Some(text) = shape.faults()? {
             problems.push(format!("the fitted body is not valid: {text}"));
@@ -235,8 +238,17 @@ impl Body {
             shape,
             solids: solids.len() as u32,
             volume,
+            face_volumes,
             problems,
         })
+    }
+}
+
+impl Body {
+    /// Volume of a shape made from this body by booleans, mm3: faces that they left alone keep what they add.
+    pub(super) fn volume_of(&self, shape: &Shape) -> Result<f64, OcctError> {
+        let known = Some((&self.shape, self.face_volumes.as_slice()));
+        Ok(shape.face_volumes(VOLUME_EPS, known)?.iter().sum())
     }
 }
 

@@ -43,6 +43,8 @@ pub(crate) struct Context<'a> {
 
 /// Points on each face that decide which body it belongs to.
 const SAMPLES: usize = 8;
+/// A face no farther from a bore's cylinder than this is its wall, mm.
+const ON_WALL: f64 = 1e-6;
 
 /// Finds for each face that is not organic the body, or the bore, whose surface it lies on.
 pub(crate) fn sources(
@@ -78,33 +80,45 @@ fn source(
     boxes: &[[[f64; 3]; 2]],
 ) -> Result<FaceSource, OcctError> {
     let mut best = (f64::MAX, FaceSource::Body(0));
+    if kind == Kind::Bore {
+        best = wall(points, bodies);
+        if best.0 <= ON_WALL {
+            return Ok(best.1);
+        }
+        // The bottom of a blind hole, or the shoulder of a stepped one: cut by the end of a tool.
+    }
     for (b, body) in bodies.iter().enumerate() {
-        if kind == Kind::Bore {
-            for (k, bore) in body.bores.iter().enumerate() {
-                // Of two coaxial bores of one radius the nearer one.
-                let away = points
-                    .iter()
-                    .map(|p| bore.distance(*p) + 1e-9 * overshoot(bore, *p))
-                    .fold(0.0, f64::max);
-                if away < best.0 {
-                    best = (away, FaceSource::Bore(b as u32, k as u32));
-                }
-            }
-        } else {
-            let outside = points
-                .iter()
-                .map(|p| box_distance(&boxes[b], *p))
-                .fold(0.0, f64::max);
-            if outside < best.0.min(1.0) {
-                let flat: Vec<[f64; 3]> = points.iter().map(|p| array(*p)).collect();
-                let away = body.solid.distances(&flat)?.into_iter().fold(0.0, f64::max);
-                if away < best.0 {
-                    best = (away, FaceSource::Body(b as u32));
-                }
+        let outside = points
+            .iter()
+            .map(|p| box_distance(&boxes[b], *p))
+            .fold(0.0, f64::max);
+        if outside < best.0.min(1.0) {
+            let flat: Vec<[f64; 3]> = points.iter().map(|p| array(*p)).collect();
+            let away = body.solid.distances(&flat)?.into_iter().fold(0.0, f64::max);
+            if away < best.0 {
+                best = (away, FaceSource::Body(b as u32));
             }
         }
     }
     Ok(best.1)
+}
+
+/// The bore whose wall is nearest, and how far the farthest point is from it, mm.
+fn wall(points: &[Vec3], bodies: &[NonDesignBody]) -> (f64, FaceSource) {
+    let mut best = (f64::MAX, FaceSource::Body(0));
+    for (b, body) in bodies.iter().enumerate() {
+        for (k, bore) in body.bores.iter().enumerate() {
+            // Of two coaxial bores of one radius the nearer one.
+            let away = points
+                .iter()
+                .map(|p| bore.distance(*p) + 1e-9 * overshoot(bore, *p))
+                .fold(0.0, f64::max);
+            if away < best.0 {
+                best = (away, FaceSource::Bore(b as u32, k as u32));
+            }
+        }
+    }
+    best
 }
 
 /// How far a point lies beyond the ends of a bore, mm.
@@ -171,11 +185,16 @@ pub(crate) fn report(
     monitor.check()?;
     let mut non_design = Vec::with_capacity(context.bodies.len());
     let faces = shape.faces()?;
+    let open = if context.probes.is_empty() {
+        Vec::new()
+    } else {
+        bores_open(&shape, context.bodies)?
+    };
     for (b, body) in context.bodies.iter().enumerate() {
         let result = if context.probes.is_empty() {
             separate(body)
         } else {
-            united(&shape, &faces, &sources, b, context)?
+            united(&shape, &faces, &sources, b, open[b], context)?
         };
         if !result.kept {
             valid = false;
@@ -229,6 +248,7 @@ fn united(
     faces: &[grassfire_occt::Face],
     sources: &[FaceSource],
     b: usize,
+    open: bool,
     context: &Context,
 ) -> Result<NonDesignResult, CadError> {
     let body = &context.bodies[b];
@@ -258,7 +278,6 @@ fn united(
         (area(&mut walls.iter().map(|w| w.0)), wall_area(body)?)
     };
     let coverage = (have / wanted).min(1.0);
-    let open = bores_open(shape, &body.bores)?;
     let exact = max_distance <= context.options.distance_tolerance;
     Ok(NonDesignResult {
         name: body.name.clone(),
@@ -286,21 +305,28 @@ fn wall_area(body: &NonDesignBody) -> Result<f64, OcctError> {
         .sum())
 }
 
-/// No line along a bore, on its axis or near its wall, meets the part.
-fn bores_open(shape: &Shape, bores: &[Bore]) -> Result<bool, OcctError> {
-    for bore in bores {
-        let range = bore.free_range();
-        if shape
-            .line_hits(&bore.lines(range))?
-            .iter()
-            .any(|hits| !hits.is_empty())
-        {
-            return Ok(false);
-        }
-        let middle = bore.origin + bore.direction * ((range[0] + range[1]) / 2.0);
-        if shape.contains(array(middle))? {
-            return Ok(false);
+/// Tells for each body whether no line along its bores, on the axis or near the wall, meets the part.
+fn bores_open(shape: &Shape, bodies: &[NonDesignBody]) -> Result<Vec<bool>, OcctError> {
+    let (mut lines, mut middles) = (Vec::new(), Vec::new());
+    let (mut body_of_line, mut body_of_middle) = (Vec::new(), Vec::new());
+    for (b, body) in bodies.iter().enumerate() {
+        for bore in &body.bores {
+            let range = bore.free_range();
+            lines.extend(bore.lines(range));
+            body_of_line.resize(lines.len(), b);
+            middles.push(array(
+                bore.origin + bore.direction * ((range[0] + range[1]) / 2.0),
+            ));
+            body_of_middle.push(b);
         }
     }
-    Ok(true)
+    let mut open = vec![true; bodies.len()];
+    // One call each: the kernel prepares every face of the part anew at every call.
+    for (hits, b) in shape.line_hits(&lines)?.iter().zip(body_of_line) {
+        open[b] &= hits.is_empty();
+    }
+    for (inside, b) in shape.contains(&middles)?.into_iter().zip(body_of_middle) {
+        open[b] &= !inside;
+    }
+    Ok(open)
 }

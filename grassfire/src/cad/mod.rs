@@ -44,7 +44,10 @@ pub use {
     bores::Bore,
     build::{CadSolid, FaceSource, build},
     inspect::NonDesignResult,
-    non_design::{NonDesignBody, Rebuilt, from_mesh, read},
+    non_design::{
+        DesignSpace, NonDesignBody, Rebuilt, SpaceBore, from_boss, from_mesh, read,
+        read_design_space,
+    },
     output::{tessellate, write_step},
 };
 

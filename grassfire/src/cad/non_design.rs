@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
-use grassfire_occt::{OcctError, Operation, Shape};
+use grassfire_occt::{OcctError, Operation, Shape, Surface};
 
 use super::bores::{self, Bore};
-use super::{CadError, NonDesignOptions, primitives, rebuild};
+use super::{CadError, NonDesignOptions, array, primitives, rebuild};
+use crate::Vec3;
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
+use crate::non_design::Boss;
 
 /// How exact the solid of a body is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -132,6 +134,120 @@ pub fn from_mesh(
         out.push(body(name, source, rebuilt, solid, options, monitor)?);
     }
     Ok(out)
+}
+
+/// Makes the sleeve of a recognised boss: a hollow cylinder, its bore kept free beyond the ends as far as the proposal is.
+///
+/// # Errors
+/// [`CadError::Kernel`], [`CadError::InvalidSolid`].
+pub fn from_boss(
+    name: &str,
+    source: &str,
+    boss: &Boss,
+    options: &NonDesignOptions,
+    monitor: &Monitor,
+) -> Result<NonDesignBody, CadError> {
+    let ([from, to], [inner, outer]) = (boss.extent, [boss.radius, boss.outer_radius]);
+    let profile = [[inner, from], [outer, from], [outer, to], [inner, to]];
+    let solid = Shape::revolve(array(boss.origin), array(boss.direction), &profile)?;
+    let options = NonDesignOptions {
+        bore_extension: options.bore_extension.min(boss.free / boss.radius),
+        ..options.clone()
+    };
+    let rebuilt = Rebuilt::Revolution {
+        residual: boss.residual,
+    };
+    body(name.to_owned(), source, rebuilt, solid, &options, monitor)
+}
+
+/// A design space: its faces as triangles, its solids, its bores.
+#[derive(Debug)]
+pub struct DesignSpace {
+    /// Tags are faces in the order of the file.
+    pub faces: TriMesh,
+    /// Faces of each solid.
+    pub solids: Vec<Vec<u32>>,
+    /// Holes.
+    pub bores: Vec<SpaceBore>,
+    /// Kind of each face: `plane`, `cylinder` ...
+    pub kinds: Vec<&'static str>,
+}
+
+/// A cylindrical hole of a design space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpaceBore {
+    /// Point of the axis, mm.
+    pub origin: Vec3,
+    /// Unit direction.
+    pub direction: Vec3,
+    /// Radius, mm.
+    pub radius: f64,
+    /// Faces of its wall.
+    pub faces: Vec<u32>,
+}
+
+/// Reads the faces of a design space from STEP, triangles within `chord` mm of them.
+///
+/// # Errors
+/// [`CadError::Unreadable`], [`CadError::NoSolid`], [`CadError::Kernel`].
+pub fn read_design_space(path: &Path, chord: f64) -> Result<DesignSpace, CadError> {
+    let source = path.display().to_string();
+    let shape = Shape::read_step(path).map_err(|e| CadError::Unreadable {
+        path: source.clone(),
+        text: e.0,
+    })?;
+    let solids = shape.solids()?;
+    if solids.is_empty() {
+        return Err(CadError::NoSolid {
+            path: source,
+            faces: shape.counts()?.faces,
+        });
+    }
+    let mut out = DesignSpace {
+        faces: TriMesh::default(),
+        solids: Vec::new(),
+        bores: Vec::new(),
+        kinds: Vec::new(),
+    };
+    for solid in &solids {
+        let mesh = solid.tessellate(chord, 0.2)?;
+        let (point, face) = (out.faces.points.len() as u32, out.kinds.len() as u32);
+        out.faces
+            .points
+            .extend(mesh.points.iter().map(|p| Vec3::from(*p)));
+        out.faces
+            .triangles
+            .extend(mesh.triangles.iter().map(|t| t.map(|v| v + point)));
+        out.faces.tags.extend(mesh.faces.iter().map(|f| f + face));
+        let own = solid.faces()?;
+        out.kinds.extend(own.iter().map(|f| kind(&f.surface)));
+        out.solids.push((face..out.kinds.len() as u32).collect());
+        for bore in bores::find(solid)? {
+            let on = |f: &usize| {
+                matches!(own[*f].surface, Surface::Cylinder { concave: true, radius } if (radius - bore.radius).abs() < 1e-6)
+                    && bore.distance(own[*f].middle.into()) < 1e-6
+            };
+            let walls = (0..own.len()).filter(on).map(|f| f as u32 + face).collect();
+            out.bores.push(SpaceBore {
+                origin: bore.origin,
+                direction: bore.direction,
+                radius: bore.radius,
+                faces: walls,
+            });
+        }
+    }
+    Ok(out)
+}
+
+fn kind(surface: &Surface) -> &'static str {
+    match surface {
+        Surface::Plane => "plane",
+        Surface::Cylinder { .. } => "cylinder",
+        Surface::Cone { .. } => "cone",
+        Surface::Sphere { .. } => "sphere",
+        Surface::Torus { .. } => "torus",
+        Surface::Free => "freeform",
+    }
 }
 
 fn body(

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::non_design::{DomainOptions, RecogniseMode, RecogniseOptions};
+
 /// How the B-rep is built, united and checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -47,6 +49,12 @@ pub struct NonDesignOptions {
     pub sharp_angle: f64,
     /// Open bores are kept free beyond their ends by this many radii.
     pub bore_extension: f64,
+    /// What is done with bodies that are recognised in the proposal.
+    pub recognise: RecogniseMode,
+    /// How they are recognised.
+    pub recognition: RecogniseOptions,
+    /// How the faces of a design space are matched.
+    pub design_space: DomainOptions,
 }
 
 impl Default for NonDesignOptions {
@@ -55,6 +63,9 @@ impl Default for NonDesignOptions {
             mesh_tolerance: 0.02,
             sharp_angle: 25.0,
             bore_extension: 1.0,
+            recognise: RecogniseMode::default(),
+            recognition: RecogniseOptions::default(),
+            design_space: DomainOptions::default(),
         }
     }
 }

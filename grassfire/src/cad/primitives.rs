@@ -286,7 +286,7 @@ fn fit(mesh: &TriMesh, normal: &[Vec3], triangles: Vec<u32>, tolerance: f64) -> 
     }
 }
 
-fn fit_plane(points: &[Vec3], weighted: &[(Vec3, Vec3, f64)]) -> (Primitive, f64) {
+pub(crate) fn fit_plane(points: &[Vec3], weighted: &[(Vec3, Vec3, f64)]) -> (Primitive, f64) {
     let centre = points.iter().sum::<Vec3>() / points.len().max(1) as f64;
     let mut spread = Matrix3::zeros();
     for p in points {
@@ -312,7 +312,10 @@ fn fit_plane(points: &[Vec3], weighted: &[(Vec3, Vec3, f64)]) -> (Primitive, f64
 }
 
 /// Axis from the normals (they lie in a plane), circle by linear least squares, then Gauss-Newton on all five parameters.
-fn fit_cylinder(points: &[Vec3], weighted: &[(Vec3, Vec3, f64)]) -> Option<(Primitive, f64)> {
+pub(crate) fn fit_cylinder(
+    points: &[Vec3],
+    weighted: &[(Vec3, Vec3, f64)],
+) -> Option<(Primitive, f64)> {
     let mut spread = Matrix3::zeros();
     for (_, n, area) in weighted {
         spread += n * n.transpose() * *area;

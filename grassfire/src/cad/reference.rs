@@ -1,6 +1,7 @@
 //! Volumes that the union must have, from ray integrals over triangulations: nothing of it goes through the kernel's booleans.
 
-use grassfire_occt::{OcctError, Shape};
+use grassfire_occt::{OcctError, Shape, Triangulation};
+use rayon::prelude::*;
 
 use super::non_design::NonDesignBody;
 use super::patches;
@@ -35,21 +36,15 @@ pub(crate) struct Probe {
 
 /// Triangles of a copy: a triangulation left in a shape could change the boxes that booleans use.
 fn facets(shape: &Shape, chord: f64, angle: f64) -> Result<Vec<[Vec3; 3]>, OcctError> {
-    triangles(&shape.translated([0.0; 3])?, chord, angle)
+    Ok(corners(
+        &shape.translated([0.0; 3])?.tessellate(chord, angle)?,
+    ))
 }
 
-/// Triangles of a shape, which keeps the triangulation.
-pub(crate) fn triangles(
-    shape: &Shape,
-    chord: f64,
-    angle: f64,
-) -> Result<Vec<[Vec3; 3]>, OcctError> {
-    let mesh = shape.tessellate(chord, angle)?;
-    Ok(mesh
-        .triangles
-        .iter()
-        .map(|t| t.map(|v| mesh.points[v as usize].into()))
-        .collect())
+/// The corners of each triangle.
+pub(crate) fn corners(mesh: &Triangulation) -> Vec<[Vec3; 3]> {
+    let corner = |v: u32| mesh.points[v as usize].into();
+    mesh.triangles.iter().map(|t| t.map(corner)).collect()
 }
 
 fn bounds(triangles: &[[Vec3; 3]]) -> (Vec3, Vec3) {
@@ -80,43 +75,59 @@ pub(crate) fn probes(
             .map_or(Ok(Vec::new()), |t| facets(t, chord, FACET))?;
         meshes.push((boss, tool));
     }
-    let mut out = Vec::with_capacity(bodies.len());
-    for (i, body) in bodies.iter().enumerate() {
-        monitor.step("cad", "independent volumes", i as f64 / bodies.len() as f64)?;
-        let (boss, tool) = &meshes[i];
-        let points: Vec<Vec3> = boss.iter().chain(tool).flatten().copied().collect();
-        let axis = body.bores.first().map_or(Vec3::z(), |b| b.direction);
-        let grid = RayGrid::around(&points, axis, rays);
-        let mut near = Vec::new();
-        for (patch, (lo, hi)) in patches.iter().zip(&boxes) {
-            if grid.sees(*lo, *hi) {
-                patches::triangles(patch, CELLS, &mut near);
-            }
+    monitor.step("cad", "independent volumes", 0.1)?;
+    (0..bodies.len())
+        .into_par_iter()
+        .map(|i| {
+            monitor.check()?;
+            let axis = bodies[i].bores.first().map_or(Vec3::z(), |b| b.direction);
+            Ok(probe(i, axis, &meshes, &patches, &boxes, rays))
+        })
+        .collect()
+}
+
+/// Triangles of a boss and of its tools.
+type Pair = (Vec<[Vec3; 3]>, Vec<[Vec3; 3]>);
+
+fn probe(
+    body: usize,
+    axis: Vec3,
+    meshes: &[Pair],
+    patches: &[patches::Bezier],
+    boxes: &[(Vec3, Vec3)],
+    rays: u32,
+) -> Probe {
+    let (boss, tool) = &meshes[body];
+    let points: Vec<Vec3> = boss.iter().chain(tool).flatten().copied().collect();
+    let grid = RayGrid::around(&points, axis, rays);
+    let mut near = Vec::new();
+    for (patch, (lo, hi)) in patches.iter().zip(boxes) {
+        if grid.sees(*lo, *hi) {
+            patches::triangles(patch, CELLS, &mut near);
         }
-        let organic = grid.columns(&near);
-        let mut solids = Vec::new();
-        for (j, (boss, tool)) in meshes.iter().enumerate() {
-            let (lo, hi) = bounds(if tool.is_empty() { boss } else { tool });
-            let (lo, hi) = (lo.inf(&bounds(boss).0), hi.sup(&bounds(boss).1));
-            if j == i || grid.sees(lo, hi) && solids.len() < 60 {
-                solids.push((j, grid.columns(boss), grid.columns(tool)));
-            }
-        }
-        let mut probe = Probe {
-            grid,
-            organic,
-            solids,
-            body: i,
-            region: 0.0,
-            organic_volume: 0.0,
-            overlap: 0.0,
-            removed: 0.0,
-            part_volume: 0.0,
-        };
-        probe.integrate();
-        out.push(probe);
     }
-    Ok(out)
+    let organic = grid.columns(&near);
+    let mut solids = Vec::new();
+    for (j, (boss, tool)) in meshes.iter().enumerate() {
+        let (lo, hi) = bounds(if tool.is_empty() { boss } else { tool });
+        let (lo, hi) = (lo.inf(&bounds(boss).0), hi.sup(&bounds(boss).1));
+        if j == body || grid.sees(lo, hi) && solids.len() < 60 {
+            solids.push((j, grid.columns(boss), grid.columns(tool)));
+        }
+    }
+    let mut probe = Probe {
+        grid,
+        organic,
+        solids,
+        body,
+        region: 0.0,
+        organic_volume: 0.0,
+        overlap: 0.0,
+        removed: 0.0,
+        part_volume: 0.0,
+    };
+    probe.integrate();
+    probe
 }
 
 /// Masks over the sets [organic, part, boss 0, tools 0, boss 1, ...].

@@ -27,6 +27,8 @@ pub(super) struct Bodies {
     pub(super) surface: TriMesh,
     /// Their bores with the length that is kept free.
     pub(super) bores: Vec<Capsule>,
+    /// Nobody gave them: the part may be made without them.
+    pub(super) recognised: bool,
 }
 
 /// Tells whether a point belongs to the non-design region, where the proposal is not the reference.
@@ -34,6 +36,32 @@ pub(super) struct Region<'a> {
     nearest: Option<Bvh>,
     bores: &'a [Capsule],
     margin: f64,
+}
+
+#[cfg(feature = "occt")]
+impl Bodies {
+    /// Adds bodies that were recognised.
+    pub(super) fn add(&mut self, solids: Vec<NonDesignBody>) -> Result<(), StageError> {
+        let first = self.solids.len();
+        self.solids.extend(solids);
+        self.measure(first)
+    }
+
+    /// Surfaces and bores of the bodies from number `first` on.
+    fn measure(&mut self, first: usize) -> Result<(), StageError> {
+        for body in &self.solids[first..] {
+            let mesh = body
+                .solid
+                .tessellate(CHORD, FACET)
+                .map_err(cad::CadError::from)?;
+            let (points, triangles) = (&mut self.surface.points, &mut self.surface.triangles);
+            let before = points.len() as u32;
+            points.extend(mesh.points.iter().map(|p| Vec3::from(*p)));
+            triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + before)));
+            self.bores.extend(body.bores.iter().map(kept_free));
+        }
+        Ok(())
+    }
 }
 
 impl Bodies {
@@ -45,6 +73,33 @@ impl Bodies {
             bores: &self.bores,
             margin,
         }
+    }
+}
+
+/// Bodies this many times as large as the proposal are in another unit.
+const OTHER_UNIT: f64 = 5.0;
+
+impl Bodies {
+    /// Refuses bodies that are far larger than the proposal: one of the two is in another unit, and nothing would fit.
+    ///
+    /// # Errors
+    /// [`StageError::Unit`].
+    pub(super) fn check_unit(&self, proposal: Option<(Vec3, Vec3)>) -> Result<(), StageError> {
+        check_unit(&self.surface, proposal)
+    }
+}
+
+/// Refuses a CAD surface that is far larger than the proposal.
+pub(super) fn check_unit(
+    surface: &TriMesh,
+    proposal: Option<(Vec3, Vec3)>,
+) -> Result<(), StageError> {
+    let size = |(lo, hi): (Vec3, Vec3)| (hi - lo).norm();
+    match (surface.bounds().map(size), proposal.map(size)) {
+        (Some(bodies), Some(proposal)) if bodies > OTHER_UNIT * proposal => {
+            Err(StageError::Unit { bodies, proposal })
+        }
+        _ => Ok(()),
     }
 }
 
@@ -76,22 +131,7 @@ pub(super) fn read(job: &ReconstructJob, monitor: &Monitor) -> Result<Bodies, St
         };
         bodies.solids.extend(solids);
     }
-    for body in &bodies.solids {
-        let surface = body
-            .solid
-            .tessellate(CHORD, FACET)
-            .map_err(cad::CadError::from)?;
-        let first = bodies.surface.points.len() as u32;
-        bodies
-            .surface
-            .points
-            .extend(surface.points.iter().map(|p| Vec3::from(*p)));
-        bodies
-            .surface
-            .triangles
-            .extend(surface.triangles.iter().map(|t| t.map(|v| v + first)));
-        bodies.bores.extend(body.bores.iter().map(kept_free));
-    }
+    bodies.measure(0)?;
     Ok(bodies)
 }
 
@@ -113,5 +153,36 @@ fn kept_free(bore: &cad::Bore) -> Capsule {
         a: at(from - bore.extension[0]),
         b: at(to + bore.extension[1]),
         radius: bore.radius,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bodies(size: f64) -> Bodies {
+        let corner = |x: f64, y: f64| Vec3::new(x, y, 0.0) * size;
+        Bodies {
+            surface: TriMesh {
+                points: vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)],
+                triangles: vec![[0, 1, 2]],
+                tags: Vec::new(),
+            },
+            ..Bodies::default()
+        }
+    }
+
+    #[test]
+    fn bodies_in_another_unit_are_refused_with_the_factor() {
+        let proposal = Some((Vec3::zeros(), Vec3::new(5.0, 2.5, 1.4)));
+        assert!(bodies(4.0).check_unit(proposal).is_ok());
+        assert!(Bodies::default().check_unit(proposal).is_ok());
+        let error = bodies(103.0).check_unit(proposal).expect_err("in mm");
+        let hint = super::super::PipelineError {
+            stage: "read",
+            source: error,
+        }
+        .hint();
+        assert!(hint.is_some_and(|h| h.contains("read.scale=25.4")));
     }
 }

@@ -59,6 +59,12 @@ pub enum StageError {
     DensityBody { path: PathBuf },
     #[error("{} cannot be united: this build has no OpenCASCADE", path.display())]
     NoKernel { path: PathBuf },
+    #[error(
+        "the CAD bodies given are {bodies:.4} mm across, the proposal only {proposal:.4} mm: they are in different units"
+    )]
+    Unit { bodies: f64, proposal: f64 },
+    #[error("{} is no STEP file; a design space must be given as STEP", path.display())]
+    DesignSpace { path: PathBuf },
     #[error("retry.quad_sizes is empty: no quad size to try")]
     NoQuadSize,
 }
@@ -71,7 +77,7 @@ impl PipelineError {
         }
         match self.source {
             StageError::Io(_) | StageError::Repair(_) | StageError::Remesh(_) => 2,
-            _ if matches!(self.stage, "read" | "non_design") => 2,
+            _ if matches!(self.stage, "read" | "non_design" | "recognise") => 2,
             _ => 3,
         }
     }
@@ -97,6 +103,8 @@ impl PipelineError {
             StageError::NoKernel { .. } => {
                 Some("build with the default feature occt, or leave out --non-design".into())
             }
+            StageError::Unit { bodies, proposal } => Some(unit_hint(bodies / proposal)),
+            StageError::DesignSpace { .. } => Some("export it from CAD as STEP".into()),
             StageError::NoQuadSize => {
                 Some("give at least one factor, such as retry.quad_sizes=[1.0]".into())
             }
@@ -117,5 +125,25 @@ impl PipelineError {
                 | StageError::Spline(SplineError::Cancelled(_))
                 | StageError::Cad(CadError::Cancelled(_))
         )
+    }
+}
+
+/// Names the unit whose size in mm is nearest to `factor`.
+fn unit_hint(factor: f64) -> String {
+    let units = [
+        ("cm", 10.0),
+        ("inches", 25.4),
+        ("feet", 304.8),
+        ("metres", 1000.0),
+    ];
+    let away = |mm: f64| (factor / mm).ln().abs();
+    match units
+        .into_iter()
+        .min_by(|a, b| away(a.1).total_cmp(&away(b.1)))
+    {
+        Some((unit, mm)) if away(mm) < 0.35 => {
+            format!("if the proposal is in {unit}, say so with --set read.scale={mm}")
+        }
+        _ => "give the proposal's unit with --set read.scale=MM_PER_UNIT".into(),
     }
 }

@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use super::bodies::Bodies;
+use super::measure::REGION_MARGIN;
 use super::shape::Shape;
 use super::union::Part;
 use crate::medial::{MedialAxis, Poles};
@@ -20,6 +22,7 @@ pub(super) fn pictures(
     axis: &MedialAxis,
     shape: &Shape,
     part: &Part,
+    non_design: &Bodies,
     options: &ReportOptions,
     monitor: &Monitor,
 ) -> Result<Vec<Picture>, super::StageError> {
@@ -29,7 +32,7 @@ pub(super) fn pictures(
     monitor.step("pictures", "drawing", 0.0)?;
     let proposal = remeshed.solid.mesh();
     let studio = Studio::new(&proposal.points, options.picture_size());
-    let voxels = deviation(remeshed, part);
+    let voxels = deviation(remeshed, part, non_design);
     let bodies: Vec<u32> = (1..=part.non_design.len() as u32).collect();
     let shots: Vec<Shot> = vec![
         Box::new(|studio| studio.proposal(proposal)),
@@ -46,10 +49,16 @@ pub(super) fn pictures(
 }
 
 /// Signed distance of every point of the part to the proposal, voxels; positive outside.
-fn deviation(remeshed: &Remeshed, part: &Part) -> Vec<f64> {
+///
+/// NaN near non-design bodies, where the proposal is not the reference: drawn grey.
+fn deviation(remeshed: &Remeshed, part: &Part, non_design: &Bodies) -> Vec<f64> {
     let field = &remeshed.field;
     let nearest = Bvh::new(remeshed.solid.mesh());
+    let region = non_design.region(REGION_MARGIN * field.spacing);
     let signed = |p: &crate::Vec3| {
+        if region.contains(p) {
+            return f64::NAN;
+        }
         let distance = nearest
             .nearest(p, f64::INFINITY)
             .map_or(0.0, |hit| hit.distance);

@@ -7,6 +7,7 @@ use sha2::{Digest, Sha256};
 use super::bodies::Bodies;
 use super::error::StageError;
 use super::{ReconstructJob, ReconstructOptions};
+use crate::Vec3;
 use crate::io::{self, Input, IoError};
 use crate::mesh::{Repair, RepairKind, RepairReport, Repaired, TriMesh, repair};
 use crate::monitor::Monitor;
@@ -28,6 +29,17 @@ pub(super) enum Proposal {
 }
 
 impl Proposal {
+    /// Lower and upper corner, mm; none when it is empty.
+    pub(super) fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        match self {
+            Self::Mesh { mesh, .. } => mesh.bounds(),
+            Self::Density { grid, .. } => {
+                let size = grid.dims.map(|n| n as f64 * grid.spacing);
+                Some((grid.origin, grid.origin + Vec3::from(size)))
+            }
+        }
+    }
+
     /// The `input` block of the report.
     pub(super) fn block(&self) -> InputBlock {
         let (Self::Mesh { report, .. } | Self::Density { report, .. }) = self;
@@ -145,6 +157,7 @@ pub(super) fn fingerprints(
 ) -> Result<Vec<InputFile>, StageError> {
     let paths = std::iter::once(&job.part)
         .chain(&job.non_design)
+        .chain(&job.design_space)
         .chain(&job.skeleton);
     paths.map(|path| fingerprint(path, monitor)).collect()
 }

@@ -14,7 +14,7 @@ use crate::report::{
 use crate::topology::SurfaceTopology;
 
 /// The non-design region reaches this far from the bodies, voxels: there the proposal is not the reference.
-const REGION_MARGIN: f64 = 2.0;
+pub(super) const REGION_MARGIN: f64 = 2.0;
 /// Places farther from the proposal than this are listed, voxels.
 const WORTH_NAMING: f64 = 1.5;
 

@@ -31,17 +31,30 @@ pub(super) struct Part {
 const CHORD: f64 = 0.05;
 
 /// Builds the CAD solid, unites it with the non-design bodies and checks it. `intersections` is how often the fitted
-/// body cuts itself: such a solid is never called valid, whatever the kernel says.
+/// body cuts itself: such a solid is never called valid, whatever the kernel says. Recognised bodies are taken away when no
+/// union with them is valid.
 #[cfg(feature = "occt")]
 pub(super) fn part(
     surface: &Surface,
-    bodies: &Bodies,
+    bodies: &mut Bodies,
     intersections: usize,
     voxel: f64,
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Part, StageError> {
     let mut solid = cad::build(&surface.brep, &bodies.solids, &options.cad, monitor)?;
+    if !solid.valid && bodies.recognised && !bodies.solids.is_empty() {
+        monitor.warn(
+            "cad",
+            format!(
+                "the {} recognised bodies could not be united and are left out: {}",
+                bodies.solids.len(),
+                solid.messages.join("; ")
+            ),
+        );
+        *bodies = Bodies::default();
+        solid = cad::build(&surface.brep, &[], &options.cad, monitor)?;
+    }
     for message in &solid.messages {
         monitor.warn("cad", message.clone());
     }
@@ -110,7 +123,7 @@ pub(super) fn deliver(part: &Part, product: &str, delivery: &Delivery) -> Result
 #[cfg(not(feature = "occt"))]
 pub(super) fn part(
     surface: &Surface,
-    _bodies: &Bodies,
+    _bodies: &mut Bodies,
     _intersections: usize,
     _voxel: f64,
     _options: &ReconstructOptions,

@@ -43,6 +43,12 @@ pub struct Report {
     /// The non-design bodies.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub non_design: Vec<NonDesignBlock>,
+    /// Surfaces and bosses that were recognised in the proposal.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub candidates: Vec<CandidateBlock>,
+    /// Faces of the design space.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub design_space: Vec<DesignFaceBlock>,
     /// Verdicts.
     pub checks: Vec<Check>,
     /// Time and memory of every stage.
@@ -284,6 +290,59 @@ pub struct NonDesignBlock {
     pub kept: bool,
     /// Radii of its bores, mm.
     pub bore_radii: Vec<f64>,
+}
+
+/// A surface or a boss that was recognised in the proposal.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct CandidateBlock {
+    /// `boss`: a through bore with a sleeve; `hollow`: any other concave cylinder; `wall`: a convex one; `plane`.
+    pub kind: String,
+    /// Radius of a cylinder or of a boss's bore, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius: Option<f64>,
+    /// Outer radius of a boss's sleeve, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outer_radius: Option<f64>,
+    /// Middle, mm.
+    pub place: [f64; 3],
+    /// Direction of the axis; normal of a plane.
+    pub axis: [f64; 3],
+    /// Length along the axis, mm.
+    pub length: f64,
+    /// Area found, mm2.
+    pub area: f64,
+    /// Share of the whole cylinder between its ends that was found.
+    pub coverage: f64,
+    /// Angle of the circumference that was found, degrees.
+    pub angle: f64,
+    /// Root mean square distance of the points to the surface, mm.
+    pub rms: f64,
+    /// Largest distance, mm.
+    pub residual: f64,
+    /// It is united with the part.
+    pub used: bool,
+    /// Why it is no boss, or not used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+/// A face of the design space.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct DesignFaceBlock {
+    /// Number in the file, from 1.
+    pub face: usize,
+    /// Solid that it belongs to, from 1.
+    pub solid: usize,
+    /// `plane`, `cylinder`, `cone`, `sphere`, `torus` or `freeform`.
+    pub kind: String,
+    /// Area, mm2.
+    pub area: f64,
+    /// Middle, mm.
+    pub place: [f64; 3],
+    /// Share of its area that the proposal follows.
+    pub coverage: f64,
+    /// It is a non-design face.
+    pub non_design: bool,
 }
 
 /// Time and memory of a stage.

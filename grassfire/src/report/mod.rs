@@ -8,6 +8,7 @@ mod checks;
 mod format;
 mod html;
 pub mod papers;
+mod recognised;
 pub mod render;
 
 use std::path::Path;
@@ -17,9 +18,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 pub use blocks::{
-    BodyBlock, CornerDeviation, DistanceBlock, FileEntry, InputBlock, InputFile, NonDesignBlock,
-    RadiusRange, RemeshBlock, RepairEntry, Report, SkeletonBlock, SolidBlock, StageEntry,
-    TopologyBlock, TopologyChangeEntry, VolumeBlock,
+    BodyBlock, CandidateBlock, CornerDeviation, DesignFaceBlock, DistanceBlock, FileEntry,
+    InputBlock, InputFile, NonDesignBlock, RadiusRange, RemeshBlock, RepairEntry, Report,
+    SkeletonBlock, SolidBlock, StageEntry, TopologyBlock, TopologyChangeEntry, VolumeBlock,
 };
 pub use checks::{Check, Limits, judge};
 pub use html::to_html;

@@ -39,6 +39,13 @@ pub const ALL: &[Paper] = &[
         used_for: "inside and outside of dirty meshes",
     },
     Paper {
+        key: "schnabel2007",
+        citation: "R. Schnabel, R. Wahl, R. Klein (2007): Efficient RANSAC for point-cloud shape detection. Computer Graphics Forum 26(2).",
+        doi: "10.1111/j.1467-8659.2007.01016.x",
+        stages: &["recognise"],
+        used_for: "planes and cylinders in the proposal",
+    },
+    Paper {
         key: "zhao2005",
         citation: "H. Zhao (2005): A fast sweeping method for Eikonal equations. Mathematics of Computation 74.",
         doi: "10.1090/S0025-5718-04-01678-3",

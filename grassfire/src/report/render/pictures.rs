@@ -152,11 +152,16 @@ impl Studio {
         self.shoot(&scene, "Solid", caption)
     }
 
-    /// Signed distance from the solid to the proposal, one value in voxels a point; the scale is -1..1 voxel.
+    /// Signed distance from the solid to the proposal, one value in voxels a point; the scale is -1..1 voxel. NaN, where
+    /// the proposal is not the reference, is grey.
     pub fn error(&self, mesh: &TriMesh, voxels: &[f64]) -> Result<Picture, RenderError> {
         let legend = Legend::symmetric("distance, voxels", 1.0);
         let scene = measured(smooth(mesh), voxels, legend);
-        let caption = "Distance from the solid to the proposal: red outside it, blue inside it.";
+        let caption = if voxels.iter().any(|d| d.is_nan()) {
+            "Distance from the solid to the proposal: red outside it, blue inside it; grey near non-design bodies."
+        } else {
+            "Distance from the solid to the proposal: red outside it, blue inside it."
+        };
         self.shoot(&scene, "Deviation", caption)
     }
 }
