@@ -49,6 +49,9 @@ pub struct NonDesignOptions {
     pub sharp_angle: f64,
     /// Open bores are kept free beyond their ends by this many radii.
     pub bore_extension: f64,
+    /// The fitted body ends this many voxels inside the walls of the bodies, so that their union cuts cleanly; 0 lets it
+    /// follow the proposal there too.
+    pub clearance: f64,
     /// What is done with bodies that are recognised in the proposal.
     pub recognise: RecogniseMode,
     /// How they are recognised.
@@ -63,6 +66,7 @@ impl Default for NonDesignOptions {
             mesh_tolerance: 0.02,
             sharp_angle: 25.0,
             bore_extension: 1.0,
+            clearance: 1.0,
             recognise: RecogniseMode::default(),
             recognition: RecogniseOptions::default(),
             design_space: DomainOptions::default(),

@@ -11,7 +11,7 @@ use crate::monitor::Monitor;
 use crate::spline::Brep;
 
 /// Cells a patch near a non-design body.
-const CELLS: usize = 24;
+const CELLS: usize = 40;
 /// Angle of the facets that stand for a non-design body, radians: their volume is right to 7e-5.
 const FACET: f64 = 0.02;
 

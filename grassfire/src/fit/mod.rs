@@ -1,11 +1,14 @@
 //! Fit: moves the control points so that the Catmull-Clark limit surface follows the proposal.
 
+mod clearance;
 mod equations;
 mod round;
 mod surface;
 mod tangles;
 mod targets;
 mod untangle;
+
+pub use clearance::{Bosses, clear_of};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -5,11 +5,14 @@ use super::error::StageError;
 use crate::Vec3;
 #[cfg(feature = "occt")]
 use crate::cad::{self, NonDesignBody};
+use crate::fit::Bosses;
 #[cfg(feature = "occt")]
 use crate::io::{self, Input};
 use crate::mesh::{Bvh, TriMesh};
 use crate::monitor::Monitor;
 use crate::remesh::Capsule;
+#[cfg(feature = "occt")]
+use grassfire_occt::Triangulation;
 
 /// Chord (mm) and facet angle (radians) of the surfaces that distances are measured to.
 #[cfg(feature = "occt")]
@@ -27,6 +30,8 @@ pub(super) struct Bodies {
     pub(super) surface: TriMesh,
     /// Their bores with the length that is kept free.
     pub(super) bores: Vec<Capsule>,
+    /// The same with their bores filled, as the fit sees them.
+    pub(super) bosses: Bosses,
     /// Nobody gave them: the part may be made without them.
     pub(super) recognised: bool,
 }
@@ -54,11 +59,14 @@ impl Bodies {
                 .solid
                 .tessellate(CHORD, FACET)
                 .map_err(cad::CadError::from)?;
-            let (points, triangles) = (&mut self.surface.points, &mut self.surface.triangles);
-            let before = points.len() as u32;
-            points.extend(mesh.points.iter().map(|p| Vec3::from(*p)));
-            triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + before)));
+            append(&mut self.surface, &mesh);
+            let boss = body
+                .boss
+                .tessellate(CHORD, FACET)
+                .map_err(cad::CadError::from)?;
+            append(&mut self.bosses.surface, &boss);
             self.bores.extend(body.bores.iter().map(kept_free));
+            self.bosses.bores.extend(body.bores.iter().map(wall));
         }
         Ok(())
     }
@@ -142,6 +150,22 @@ pub(super) fn read(job: &ReconstructJob, _monitor: &Monitor) -> Result<Bodies, S
         Some(path) => Err(StageError::NoKernel { path: path.clone() }),
         None => Ok(Bodies::default()),
     }
+}
+
+#[cfg(feature = "occt")]
+fn append(to: &mut TriMesh, mesh: &Triangulation) {
+    let before = to.points.len() as u32;
+    to.points.extend(mesh.points.iter().map(|p| Vec3::from(*p)));
+    let triangles = mesh.triangles.iter().map(|t| t.map(|v| v + before));
+    to.triangles.extend(triangles);
+}
+
+/// The wall of a bore.
+#[cfg(feature = "occt")]
+fn wall(bore: &cad::Bore) -> Capsule {
+    let [a, b] = bore.extent.map(|t| bore.origin + t * bore.direction);
+    let radius = bore.radius;
+    Capsule { a, b, radius }
 }
 
 /// The length of a bore that stays free of organic material.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::ReconstructOptions;
 use super::error::{PipelineError, StageError};
 use super::record::Record;
-use crate::fit::{Fitted, fit};
+use crate::fit::{Bosses, Fitted, clear_of, fit};
 use crate::medial::MedialAxis;
 use crate::monitor::Monitor;
 use crate::radii;
@@ -17,6 +17,7 @@ use crate::spline::{
     self, Brep, ControlMesh, G1Report, SplineError, Tessellation, build_brep, patches, tessellate,
 };
 use crate::thicken::{self, ThickenedBody, thicken};
+use crate::voxel::VoxelGrid;
 
 /// When to try again with another quad size, and with which.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -56,6 +57,8 @@ struct Workshop<'a> {
     record: &'a mut Record,
     axis: &'a MedialAxis,
     remeshed: &'a Remeshed,
+    /// The field that bodies are fitted to.
+    target: &'a VoxelGrid<f32>,
     /// A skeleton drawn elsewhere.
     drawn: Option<&'a Skeleton>,
     options: &'a ReconstructOptions,
@@ -68,14 +71,20 @@ pub(super) fn shape(
     record: &mut Record,
     axis: &MedialAxis,
     remeshed: &Remeshed,
+    bosses: &Bosses,
     drawn: Option<&Skeleton>,
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Shape, PipelineError> {
+    let clearance = options.non_design.clearance * remeshed.field.spacing;
+    let target = record.stage("fit", || {
+        Ok::<_, StageError>(clear_of(&remeshed.field, bosses, clearance))
+    })?;
     let mut workshop = Workshop {
         record,
         axis,
         remeshed,
+        target: &target,
         drawn,
         options,
         monitor,
@@ -178,7 +187,7 @@ impl Workshop<'_> {
         body: ThickenedBody,
         wrapped: bool,
     ) -> Result<(Score, Shape), PipelineError> {
-        let (field, options) = (&self.remeshed.field, &self.options.fit);
+        let (field, options) = (self.target, &self.options.fit);
         let fitted = self.record.stage("fit", || {
             fit(&body, &skeleton.skeleton, field, options, self.monitor)
         })?;

@@ -1,0 +1,172 @@
+//! What the body is fitted to near non-design bodies: it ends inside their walls.
+
+use rayon::prelude::*;
+
+use crate::Vec3;
+use crate::mesh::{Bvh, TriMesh, Winding};
+use crate::remesh::Capsule;
+use crate::voxel::VoxelGrid;
+
+/// The non-design bodies as the fit sees them.
+#[derive(Debug, Clone, Default)]
+pub struct Bosses {
+    /// Their closed surfaces, bores filled.
+    pub surface: TriMesh,
+    /// The walls of their bores: a cylinder about `a`-`b` each.
+    pub bores: Vec<Capsule>,
+}
+
+/// Near the bodies distances are exact up to this many voxels; what lies deeper is left alone.
+const REACH: f64 = 4.0;
+/// Outside the walls the drawing fades over this many voxels; over more of them members would lose volume.
+const FADE: f64 = 1.0;
+/// Surfaces of proposal and body whose normals differ by less than the first cosine run along each other; from the
+/// second on they count as crossing.
+const ALONG: [f64; 2] = [0.8, 0.3];
+
+/// The field whose surface the body should follow, so that its union with the bodies cuts cleanly.
+///
+/// A proposal contains its non-design bodies, so a body fitted to it hugs their walls, and the union is full of slivers.
+/// 1. Where the proposal's surface runs along a wall it is drawn `depth` mm into that body, fading out over one voxel
+///    around it. Where a member meets the wall it runs on into it.
+/// 2. In a bore it is moved `depth` mm into the hole, which is cut after the union: an eye keeps its thickness.
+///
+/// `field` is the signed distance to the proposal, mm, positive inside. The topology of the result may differ from that
+/// of `field`; it is for fitting only. It does not depend on the number of threads.
+pub fn clear_of(field: &VoxelGrid<f32>, bosses: &Bosses, depth: f64) -> VoxelGrid<f32> {
+    let bvh = Bvh::new(&bosses.surface);
+    let (Some((lo, hi)), true) = (bvh.bounds(), depth > 0.0) else {
+        return field.clone();
+    };
+    let winding = Winding::new(&bvh);
+    let voxel = field.spacing;
+    let reach = REACH * voxel;
+    let margin = Vec3::repeat(FADE * voxel);
+    let near = |p: &Vec3| (0..3).all(|a| lo[a] - margin[a] <= p[a] && p[a] <= hi[a] + margin[a]);
+    let value = |(index, &f): (usize, &f32)| {
+        let [i, j, k] = field.ijk(index);
+        let p = field.origin + voxel * Vec3::new(i as f64, j as f64, k as f64);
+        let f = f64::from(f);
+        if f.abs() > reach || !near(&p) {
+            return f as f32;
+        }
+        let inside = winding.at(&p) > 0.5;
+        let nearest = bvh.nearest(&p, reach);
+        let distance = nearest.map_or(reach, |n| n.distance);
+        let s = if inside { distance } else { -distance };
+        if s <= -FADE * voxel {
+            return f as f32;
+        }
+        let along = nearest.map_or(0.0, |n| {
+            let [a, b, c] = bosses.surface.corners(n.triangle as usize);
+            let off = (p - n.point) * if inside { 1.0 } else { -1.0 };
+            let inward = off
+                .try_normalize(1e-3 * voxel)
+                .unwrap_or_else(|| -(b - a).cross(&(c - a)).normalize());
+            let slope = field.gradient(&p);
+            let cosine = slope.dot(&inward) / slope.norm().max(1e-12);
+            ((cosine - ALONG[1]) / (ALONG[0] - ALONG[1])).clamp(0.0, 1.0)
+        });
+        let drawn = f - depth * along * (1.0 + s / (FADE * voxel)).clamp(0.0, 1.0);
+        let band = bosses
+            .bores
+            .iter()
+            .map(|bore| into_bore(bore, &p, depth, voxel));
+        drawn.max(band.fold(f64::NEG_INFINITY, f64::max).min(s - depth)) as f32
+    };
+    VoxelGrid {
+        values: field.values.par_iter().enumerate().map(value).collect(),
+        ..field.clone()
+    }
+}
+
+/// Signed distance to a tube that lines a bore: from `depth` inside the hole to somewhat outside its wall.
+fn into_bore(bore: &Capsule, p: &Vec3, depth: f64, voxel: f64) -> f64 {
+    let axis = bore.b - bore.a;
+    let along = (p - bore.a).dot(&axis) / axis.norm_squared().max(1e-12);
+    let radial = (p - bore.a - along * axis).norm();
+    if !(0.0..=1.0).contains(&along) || radial > bore.radius + 2.0 * voxel {
+        return f64::NEG_INFINITY;
+    }
+    radial - (bore.radius - depth).max(0.3 * bore.radius)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(f: impl Fn(&Vec3) -> f64) -> VoxelGrid<f32> {
+        let mut grid = VoxelGrid::filled(Vec3::repeat(-12.0), 0.5, [49, 49, 49], 0.0_f32);
+        for v in 0..grid.values.len() {
+            let [i, j, k] = grid.ijk(v);
+            let p = grid.origin + 0.5 * Vec3::new(i as f64, j as f64, k as f64);
+            grid.values[v] = f(&p) as f32;
+        }
+        grid
+    }
+
+    fn ball(radius: f64) -> TriMesh {
+        const N: u32 = 48;
+        let mut mesh = TriMesh::default();
+        let at = |i: u32, j: u32| {
+            let (s, c) = (std::f64::consts::PI * f64::from(i) / f64::from(N)).sin_cos();
+            let (t, d) = (std::f64::consts::TAU * f64::from(j % N) / f64::from(N)).sin_cos();
+            radius * Vec3::new(s * d, s * t, c)
+        };
+        for i in 0..N {
+            for j in 0..N {
+                for corners in [
+                    [(i, j), (i + 1, j), (i + 1, j + 1)],
+                    [(i, j), (i + 1, j + 1), (i, j + 1)],
+                ] {
+                    let first = mesh.points.len() as u32;
+                    mesh.points.extend(corners.map(|(i, j)| at(i, j)));
+                    mesh.triangles.push([first, first + 1, first + 2]);
+                }
+            }
+        }
+        mesh
+    }
+
+    #[test]
+    fn a_wall_is_left_and_a_member_runs_on() {
+        // A ball with a bar along x.
+        let proposal = |p: &Vec3| (5.0 - p.norm()).max(2.0 - p.yz().norm());
+        let bosses = Bosses {
+            surface: ball(5.0),
+            bores: Vec::new(),
+        };
+        let cleared = clear_of(&grid(proposal), &bosses, 0.5);
+        // The wall's own surface has moved in by the depth, away from the member.
+        assert!((cleared.sample(&Vec3::new(0.0, 4.5, 0.0))).abs() < 0.05);
+        assert!((cleared.sample(&Vec3::new(0.0, 0.0, -4.5))).abs() < 0.05);
+        // The bar goes through the wall as thick as before.
+        assert!(cleared.sample(&Vec3::new(5.0, 1.8, 0.0)) > 0.0);
+        assert!((cleared.sample(&Vec3::new(7.0, 2.0, 0.0))).abs() < 0.02);
+    }
+
+    #[test]
+    fn an_eye_keeps_its_thickness() {
+        // A long tube of 6 mm with a bore of 3 mm.
+        let proposal = |p: &Vec3| (6.0 - p.xy().norm()).min(p.xy().norm() - 3.0);
+        let mut surface = ball(6.0);
+        for p in &mut surface.points {
+            p.z *= 20.0;
+        }
+        let (a, b) = (Vec3::new(0.0, 0.0, -11.0), Vec3::new(0.0, 0.0, 11.0));
+        let bores = vec![Capsule { a, b, radius: 3.0 }];
+        let cleared = clear_of(&grid(proposal), &Bosses { surface, bores }, 0.5);
+        assert!(cleared.sample(&Vec3::new(2.6, 0.0, 0.0)) > 0.0);
+        assert!(cleared.sample(&Vec3::new(2.3, 0.0, 0.0)) < 0.0);
+        assert!((cleared.sample(&Vec3::new(5.5, 0.0, 0.0))).abs() < 0.1);
+    }
+
+    #[test]
+    fn without_bodies_nothing_changes() {
+        let field = grid(|p| 5.0 - p.norm());
+        assert_eq!(
+            clear_of(&field, &Bosses::default(), 0.5).values,
+            field.values
+        );
+    }
+}
