@@ -28,6 +28,10 @@ pub(super) struct Bodies {
     /// Their bores with the length that is kept free.
     pub(super) bores: Vec<Capsule>,
     /// Nobody gave them: the part may be made without them.
+    #[cfg_attr(
+        not(feature = "occt"),
+        allow(dead_code, reason = "without OpenCASCADE there is no union")
+    )]
     pub(super) recognised: bool,
 }
 
