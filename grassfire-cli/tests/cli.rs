@@ -102,7 +102,7 @@ fn reconstruct_help_is_complete() {
           --json                 Print report.json on stdout
       -q, --quiet                No progress, warnings or summary
       -v, --verbose              Say when each stage ends and how long it took
-      -h, --help                 Print help
+      -h, --help                 Print help (see more with '--help')
 
     Examples:
       grassfire reconstruct part.stl -o out

@@ -208,16 +208,15 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
     record.report.volume = Some(measure::volume_block(&remeshed, &part));
 
     let pictures = record.stage("pictures", || {
-        illustrate::pictures(
-            &remeshed,
-            &poles,
-            &axis,
-            &shape,
-            &part,
-            &bodies,
-            &options.report,
-            monitor,
-        )
+        let stages = illustrate::Stages {
+            remeshed: &remeshed,
+            poles: &poles,
+            axis: &axis,
+            shape: &shape,
+            part: &part,
+            non_design: &bodies,
+        };
+        illustrate::pictures(&stages, &options.report, monitor)
     })?;
     let failed_checks = record.finish(&options.report.limits, monitor);
     delivery

@@ -276,7 +276,8 @@ fn volumes(
     commons: [f64; 2],
     context: &inspect::Context,
 ) -> Result<(), String> {
-    if !(((volume - expected) / expected).abs() <= IDENTITY) {
+    let difference = ((volume - expected) / expected).abs();
+    if difference.is_nan() || difference > IDENTITY {
         return Err(format!(
             "inclusion-exclusion gives {expected:.6} mm3, the union has {volume:.6} mm3"
         ));

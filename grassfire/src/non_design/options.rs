@@ -23,13 +23,13 @@ pub enum RecogniseMode {
 pub struct RecogniseOptions {
     /// Seed of the random choices.
     pub seed: u64,
-    /// A vertex belongs to a surface within this distance, in median edge lengths of the mesh.
+    /// A vertex belongs to a surface within this distance, in edge lengths (the lower quartile of the mesh's).
     pub tolerance: f64,
     /// A triangle belongs to a surface when its normal is within this angle of the surface's, degrees.
     pub normal_angle: f64,
     /// Random pairs of triangles tried around each seed.
     pub tries: u32,
-    /// Smallest surface listed, squared median edge lengths.
+    /// Smallest surface listed, squared edge lengths.
     pub min_area: f64,
     /// A hole is a bore when its wall covers at least this angle of the circumference, degrees.
     pub min_bore_angle: f64,

@@ -99,7 +99,7 @@ pub(super) fn search(
             break;
         }
         if !search.used[seed as usize] && !search.tried[seed as usize] {
-            found.extend(search.from_seed(seed));
+            found.extend(search.at_seed(seed));
         }
     }
     let merged = merge(facets, found, search.tolerance);
@@ -145,7 +145,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn from_seed(&mut self, seed: u32) -> Option<(Primitive, Vec<u32>)> {
+    fn at_seed(&mut self, seed: u32) -> Option<(Primitive, Vec<u32>)> {
         self.tried[seed as usize] = true;
         let patch = self.patch(seed);
         if patch.len() < 2 {
@@ -156,10 +156,10 @@ impl Search<'_> {
         let plane = self.plane(seed, &patch);
         let flat = self.score(&plane, &patch, 1.0);
         self.try_growing(seed, plane, &mut best);
-        if flat < 0.9 * whole || best.is_none() {
-            if let Some(cylinder) = self.best_cylinder(&patch, flat) {
-                self.try_growing(seed, cylinder, &mut best);
-            }
+        if (flat < 0.9 * whole || best.is_none())
+            && let Some(cylinder) = self.best_cylinder(&patch, flat)
+        {
+            self.try_growing(seed, cylinder, &mut best);
         }
         let (area, surface, triangles) = best?;
         for &t in &triangles {

@@ -33,6 +33,10 @@ pub(super) struct Bodies {
     /// The same with their bores filled, as the fit sees them.
     pub(super) bosses: Bosses,
     /// Nobody gave them: the part may be made without them.
+    #[cfg_attr(
+        not(feature = "occt"),
+        allow(dead_code, reason = "without OpenCASCADE there is no union")
+    )]
     pub(super) recognised: bool,
 }
 

@@ -15,17 +15,30 @@ use crate::report::{Picture, ReportError, ReportOptions};
 
 type Shot<'a> = Box<dyn Fn(&Studio) -> Result<Picture, RenderError> + Sync + 'a>;
 
+/// What the pictures show: the result of every stage.
+pub(super) struct Stages<'a> {
+    pub(super) remeshed: &'a Remeshed,
+    pub(super) poles: &'a Poles,
+    pub(super) axis: &'a MedialAxis,
+    pub(super) shape: &'a Shape,
+    pub(super) part: &'a Part,
+    pub(super) non_design: &'a Bodies,
+}
+
 /// Draws proposal, thickness, medial axis, skeleton, body, part and its deviation from the proposal.
 pub(super) fn pictures(
-    remeshed: &Remeshed,
-    poles: &Poles,
-    axis: &MedialAxis,
-    shape: &Shape,
-    part: &Part,
-    non_design: &Bodies,
+    stages: &Stages,
     options: &ReportOptions,
     monitor: &Monitor,
 ) -> Result<Vec<Picture>, super::StageError> {
+    let Stages {
+        remeshed,
+        poles,
+        axis,
+        shape,
+        part,
+        non_design,
+    } = *stages;
     if !options.pictures {
         return Ok(Vec::new());
     }

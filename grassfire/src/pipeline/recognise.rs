@@ -114,6 +114,10 @@ fn add(
 }
 
 /// A design space matched with the proposal.
+#[cfg_attr(
+    not(feature = "occt"),
+    allow(dead_code, reason = "only OpenCASCADE reads STEP files")
+)]
 struct Matched {
     rows: Vec<DesignFaceBlock>,
     /// The covered bores.
