@@ -32,8 +32,9 @@ demo: build ## reconstruct the wishbone: STEP and report in out/wishbone
 	fi
 	exit $$code
 
-test: setup ## format, lints, all tests (with the corpus where it is), checks of the demo's STEP by other programs
-	@tools/test.sh
+test: ## format, lints, all tests (with the corpus where it is), checks of the demo's STEP by other programs
+	@tools/setup.sh test
+	tools/test.sh
 
 bench: setup ## speed of the medial stage beside CGAL (installs libcgal-dev), and of the faces
 	@. tools/env.sh

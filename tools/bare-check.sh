@@ -35,6 +35,8 @@ for file in /etc/apt/apt.conf.d/*proxy*; do [ -f "$file" ] && cp "$file" "$root/
 mkdir -p "$root/root/.cargo"
 for file in "${CARGO_HOME:-$HOME/.cargo}"/config.toml; do [ -f "$file" ] && cp "$file" "$root/root/.cargo/"; done
 
+if [ -f /etc/pip.conf ]; then cp /etc/pip.conf "$root/etc/"; fi
+
 mounted=()
 cleanup() { for place in "${mounted[@]}"; do umount "$place" || true; done; }
 trap cleanup EXIT

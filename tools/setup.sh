@@ -1,5 +1,6 @@
 #!/bin/bash
 # Installs what grassfire needs to build and is missing: a C++ compiler, OpenCASCADE's headers, Rust.
+# With the word "test" also what the outside checks need: Python with venv, and the libraries that gmsh's wheel links to.
 # Does nothing, and needs neither root nor network, when all is there.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -23,6 +24,18 @@ has BRep_Builder.hxx            || packages+=(libocct-modeling-data-dev)
 has BRepAlgoAPI_Fuse.hxx        || packages+=(libocct-modeling-algorithms-dev)
 has STEPControl_Writer.hxx      || packages+=(libocct-data-exchange-dev)
 has XCAFDoc_ShapeTool.hxx       || packages+=(libocct-ocaf-dev)
+if [ "${1:-}" = test ]; then
+  python3 -c 'import venv, ensurepip' >/dev/null 2>&1 || packages+=(python3 python3-venv)
+  loadable() { ldconfig -p 2>/dev/null | grep -q "$1"; }
+  loadable libGL.so.1          || packages+=(libgl1)
+  loadable libGLU.so.1         || packages+=(libglu1-mesa)
+  loadable libXcursor.so.1     || packages+=(libxcursor1)
+  loadable libXfixes.so.3      || packages+=(libxfixes3)
+  loadable libXft.so.2         || packages+=(libxft2)
+  loadable libXinerama.so.1    || packages+=(libxinerama1)
+  loadable libXrender.so.1     || packages+=(libxrender1)
+  loadable libfontconfig.so.1  || packages+=(libfontconfig1)
+fi
 need_rust=
 command -v cargo >/dev/null 2>&1 || need_rust=yes
 if [ -n "$need_rust" ] && ! command -v curl >/dev/null 2>&1; then packages+=(curl ca-certificates); fi

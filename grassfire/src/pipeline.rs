@@ -113,7 +113,7 @@ pub struct Outcome {
 /// 2. Remeshes it on voxels to a closed solid and removes topological noise.
 /// 3. Computes wall thickness (poles) and the pruned medial axis.
 /// 4. Builds the quad skeleton (or reads the given one), maps and smooths its radii.
-/// 5. Thickens it and fits the limit surface to the proposal; near non-design bodies it ends inside their walls.
+/// 5. Thickens it and fits the limit surface to the proposal; near given non-design bodies it ends inside their walls.
 /// 6. Builds the G1 faces and the boundary representation.
 /// 7. Builds the CAD solid, unites it with the non-design bodies, checks it.
 /// 8. Measures distance and volume, draws the pictures, writes the report.
@@ -156,42 +156,37 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
     })?;
     record.stage("write", || delivery.medial(&axis.mesh))?;
 
-    // Twice at most: recognised bodies that do not unite are left out, and the body is fitted without them.
-    let (shape, part) = loop {
-        let shape = shape::shape(
-            &mut record,
-            &axis,
-            &remeshed,
-            &bodies.bosses,
-            drawn.as_ref(),
-            options,
-            monitor,
-        )?;
-        record.stage("write", || delivery.skeleton(&shape.skeleton.skeleton))?;
-        record.stage("write", || delivery.body(&shape.fitted.mesh))?;
-        let mesh = &shape.fitted.mesh;
-        let surface = record.stage("spline", || shape::surface(mesh, voxel, options, monitor))?;
-        record.stage("write", || {
-            delivery.stl("body.stl", &surface.tessellation.mesh)
-        })?;
-        let intersections = shape.fitted.self_intersections.len();
-        let part = record.stage("cad", || {
-            union::part(
-                &surface,
-                &mut bodies,
-                intersections,
-                voxel,
-                options,
-                monitor,
-            )
-        })?;
-        if let Some(part) = part {
-            break (shape, part);
-        }
-    };
+    let shape = shape::shape(
+        &mut record,
+        &axis,
+        &remeshed,
+        &bodies.bosses,
+        drawn.as_ref(),
+        options,
+        monitor,
+    )?;
     record.report.topology = Some(measure::topology_block(&axis, &shape));
     record.report.skeleton = Some(measure::skeleton_block(&axis, &shape));
     record.report.body = Some(measure::body_block(&shape));
+    record.stage("write", || delivery.skeleton(&shape.skeleton.skeleton))?;
+    record.stage("write", || delivery.body(&shape.fitted.mesh))?;
+
+    let mesh = &shape.fitted.mesh;
+    let surface = record.stage("spline", || shape::surface(mesh, voxel, options, monitor))?;
+    record.stage("write", || {
+        delivery.stl("body.stl", &surface.tessellation.mesh)
+    })?;
+    let intersections = shape.fitted.self_intersections.len();
+    let part = record.stage("cad", || {
+        union::part(
+            &surface,
+            &mut bodies,
+            intersections,
+            voxel,
+            options,
+            monitor,
+        )
+    })?;
     if part.non_design.is_empty() {
         recognise::left_out(&mut record.report.candidates);
     }

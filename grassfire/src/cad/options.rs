@@ -49,8 +49,8 @@ pub struct NonDesignOptions {
     pub sharp_angle: f64,
     /// Open bores are kept free beyond their ends by this many radii.
     pub bore_extension: f64,
-    /// The fitted body ends this many voxels inside the walls of the bodies, so that their union cuts cleanly; 0 lets it
-    /// follow the proposal there too.
+    /// The fitted body ends this many voxels inside the walls of the bodies that were given, so that their union cuts
+    /// cleanly; 0 lets it follow the proposal there too.
     pub clearance: f64,
     /// What is done with bodies that are recognised in the proposal.
     pub recognise: RecogniseMode,

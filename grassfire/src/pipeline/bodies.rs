@@ -30,7 +30,8 @@ pub(super) struct Bodies {
     pub(super) surface: TriMesh,
     /// Their bores with the length that is kept free.
     pub(super) bores: Vec<Capsule>,
-    /// The same with their bores filled, as the fit sees them.
+    /// The given ones with their bores filled, as the fit sees them. Recognised ones are made from the proposal's own
+    /// walls, which are not thick enough for a body to end inside them.
     pub(super) bosses: Bosses,
     /// Nobody gave them: the part may be made without them.
     #[cfg_attr(
@@ -64,13 +65,7 @@ impl Bodies {
                 .tessellate(CHORD, FACET)
                 .map_err(cad::CadError::from)?;
             append(&mut self.surface, &mesh);
-            let boss = body
-                .boss
-                .tessellate(CHORD, FACET)
-                .map_err(cad::CadError::from)?;
-            append(&mut self.bosses.surface, &boss);
             self.bores.extend(body.bores.iter().map(kept_free));
-            self.bosses.bores.extend(body.bores.iter().map(wall));
         }
         Ok(())
     }
@@ -144,6 +139,14 @@ pub(super) fn read(job: &ReconstructJob, monitor: &Monitor) -> Result<Bodies, St
         bodies.solids.extend(solids);
     }
     bodies.measure(0)?;
+    for body in &bodies.solids {
+        let mesh = body
+            .boss
+            .tessellate(CHORD, FACET)
+            .map_err(cad::CadError::from)?;
+        append(&mut bodies.bosses.surface, &mesh);
+        bodies.bosses.bores.extend(body.bores.iter().map(wall));
+    }
     Ok(bodies)
 }
 

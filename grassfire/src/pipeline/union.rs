@@ -41,7 +41,7 @@ pub(super) fn part(
     voxel: f64,
     options: &ReconstructOptions,
     monitor: &Monitor,
-) -> Result<Option<Part>, StageError> {
+) -> Result<Part, StageError> {
     let mut solid = cad::build(&surface.brep, &bodies.solids, &options.cad, monitor)?;
     if !solid.valid && bodies.recognised && !bodies.solids.is_empty() {
         monitor.warn(
@@ -53,7 +53,7 @@ pub(super) fn part(
             ),
         );
         *bodies = Bodies::default();
-        return Ok(None);
+        solid = cad::build(&surface.brep, &[], &options.cad, monitor)?;
     }
     for message in &solid.messages {
         monitor.warn("cad", message.clone());
@@ -86,14 +86,14 @@ pub(super) fn part(
         .map(|body| body.max_distance)
         .reduce(f64::max);
     let non_design = solid.non_design.iter().map(entry).collect();
-    Ok(Some(Part {
+    Ok(Part {
         mesh: triangles,
         volume: solid.volume,
         non_design_max,
         block: Some(block),
         non_design,
         solid,
-    }))
+    })
 }
 
 #[cfg(feature = "occt")]
@@ -128,7 +128,7 @@ pub(super) fn part(
     _voxel: f64,
     _options: &ReconstructOptions,
     monitor: &Monitor,
-) -> Result<Option<Part>, StageError> {
+) -> Result<Part, StageError> {
     let kink = surface.g1.max_angle_deg;
     monitor.warn(
         "cad",
@@ -138,13 +138,13 @@ pub(super) fn part(
         tags: Vec::new(),
         ..surface.tessellation.mesh.clone()
     };
-    Ok(Some(Part {
+    Ok(Part {
         mesh,
         volume: surface.brep.volume,
         non_design_max: None,
         block: None,
         non_design: Vec::new(),
-    }))
+    })
 }
 
 /// Writes `part.stl`.
