@@ -26,7 +26,8 @@ has STEPControl_Writer.hxx      || packages+=(libocct-data-exchange-dev)
 has XCAFDoc_ShapeTool.hxx       || packages+=(libocct-ocaf-dev)
 if [ "${1:-}" = test ]; then
   python3 -c 'import venv, ensurepip' >/dev/null 2>&1 || packages+=(python3 python3-venv)
-  loadable() { ldconfig -p 2>/dev/null | grep -q "$1"; }
+  libraries=$(PATH=$PATH:/usr/sbin:/sbin ldconfig -p 2>/dev/null || true)
+  loadable() { grep -q "$1" <<<"$libraries"; }
   loadable libGL.so.1          || packages+=(libgl1)
   loadable libGLU.so.1         || packages+=(libglu1-mesa)
   loadable libXcursor.so.1     || packages+=(libxcursor1)
