@@ -177,6 +177,9 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         delivery.stl("body.stl", &surface.tessellation.mesh)
     })?;
     let intersections = shape.fitted.self_intersections.len();
+    if shape.wrapped || intersections > 0 {
+        bodies.drop_recognised(monitor);
+    }
     let part = record.stage("cad", || {
         union::part(
             &surface,

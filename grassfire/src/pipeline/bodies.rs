@@ -83,6 +83,17 @@ impl Bodies {
     }
 }
 
+impl Bodies {
+    /// Leaves recognised bodies out of a wrapped part, which follows the proposal closely anyway and whose many faces take
+    /// minutes to unite, and out of one that cuts itself, which is not valid with them either.
+    pub(super) fn drop_recognised(&mut self, monitor: &Monitor) {
+        if self.recognised {
+            monitor.warn("cad", "the body is wrapped around the part or cuts itself: recognised bores and bosses are listed, not united; give them with --non-design to have them exact".to_owned());
+            *self = Self::default();
+        }
+    }
+}
+
 /// Bodies this many times as large as the proposal are in another unit.
 const OTHER_UNIT: f64 = 5.0;
 

@@ -236,7 +236,7 @@ fn design_space(
 pub(super) fn left_out(candidates: &mut [CandidateBlock]) {
     for row in candidates.iter_mut().filter(|row| row.used) {
         row.used = false;
-        row.reason = Some("no valid union with the part".to_owned());
+        row.reason = Some("not united with the part, see the warnings".to_owned());
     }
 }
 
