@@ -3,6 +3,7 @@
 use grassfire_occt::{Face, Line, OcctError, Shape, Surface};
 
 use super::array;
+use super::primitives::across;
 use crate::Vec3;
 
 /// A cylindrical hole.
@@ -67,13 +68,7 @@ impl Bore {
 
     /// The axis and eight lines parallel to it near the wall, over `range` along the axis.
     pub(crate) fn lines(&self, range: [f64; 2]) -> Vec<Line> {
-        let side = if self.direction.x.abs() < 0.8 {
-            Vec3::x()
-        } else {
-            Vec3::y()
-        };
-        let e1 = self.direction.cross(&side).normalize();
-        let e2 = self.direction.cross(&e1);
+        let [e1, e2] = across(&self.direction);
         let ring = (0..8).map(|k| {
             // Off the quarter points: a line in a seam or in a patch border is a bad witness.
             let angle = 0.3 + std::f64::consts::TAU * f64::from(k) / 8.0;

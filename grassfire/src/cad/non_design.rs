@@ -52,17 +52,9 @@ pub struct NonDesignBody {
 const STAGE: &str = "cad";
 const VOLUME_EPS: f64 = 1e-9;
 
-/// Reads the non-design bodies of a STEP file: each solid is one.
-///
-/// # Errors
-/// [`CadError::Unreadable`], [`CadError::NoSolid`], [`CadError::InvalidSolid`].
-pub fn read(
-    path: &Path,
-    options: &NonDesignOptions,
-    monitor: &Monitor,
-) -> Result<Vec<NonDesignBody>, CadError> {
+/// The solids of a STEP file, at least one.
+fn read_solids(path: &Path) -> Result<Vec<Shape>, CadError> {
     let source = path.display().to_string();
-    monitor.step(STAGE, "reading non-design bodies", 0.0)?;
     let shape = Shape::read_step(path).map_err(|e| CadError::Unreadable {
         path: source.clone(),
         text: e.0,
@@ -74,6 +66,21 @@ pub fn read(
             faces: shape.counts()?.faces,
         });
     }
+    Ok(solids)
+}
+
+/// Reads the non-design bodies of a STEP file: each solid is one.
+///
+/// # Errors
+/// [`CadError::Unreadable`], [`CadError::NoSolid`], [`CadError::InvalidSolid`].
+pub fn read(
+    path: &Path,
+    options: &NonDesignOptions,
+    monitor: &Monitor,
+) -> Result<Vec<NonDesignBody>, CadError> {
+    let source = path.display().to_string();
+    monitor.step(STAGE, "reading non-design bodies", 0.0)?;
+    let solids = read_solids(path)?;
     let stem = path
         .file_stem()
         .map_or_else(|| "body".into(), |s| s.to_string_lossy().into_owned());
@@ -191,18 +198,7 @@ pub struct SpaceBore {
 /// # Errors
 /// [`CadError::Unreadable`], [`CadError::NoSolid`], [`CadError::Kernel`].
 pub fn read_design_space(path: &Path, chord: f64) -> Result<DesignSpace, CadError> {
-    let source = path.display().to_string();
-    let shape = Shape::read_step(path).map_err(|e| CadError::Unreadable {
-        path: source.clone(),
-        text: e.0,
-    })?;
-    let solids = shape.solids()?;
-    if solids.is_empty() {
-        return Err(CadError::NoSolid {
-            path: source,
-            faces: shape.counts()?.faces,
-        });
-    }
+    let solids = read_solids(path)?;
     let mut out = DesignSpace {
         faces: TriMesh::default(),
         solids: Vec::new(),

@@ -325,13 +325,7 @@ pub(crate) fn fit_cylinder(
     let mut origin = points.iter().sum::<Vec3>() / points.len() as f64;
     let mut radius = 0.0;
     for round in 0..20 {
-        let side = if direction.x.abs() < 0.8 {
-            Vec3::x()
-        } else {
-            Vec3::y()
-        };
-        let e1 = direction.cross(&side).normalize();
-        let e2 = direction.cross(&e1);
+        let [e1, e2] = across(&direction);
         let local = |p: &Vec3| {
             [
                 (p - origin).dot(&e1),
@@ -397,4 +391,15 @@ pub(crate) fn fit_cylinder(
         },
         residual,
     ))
+}
+
+/// Two unit vectors across an axis.
+pub(crate) fn across(direction: &Vec3) -> [Vec3; 2] {
+    let side = if direction.x.abs() < 0.8 {
+        Vec3::x()
+    } else {
+        Vec3::y()
+    };
+    let first = direction.cross(&side).normalize();
+    [first, direction.cross(&first)]
 }

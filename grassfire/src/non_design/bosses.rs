@@ -2,9 +2,9 @@
 
 use super::RecogniseOptions;
 use super::facets::Facets;
-use super::ransac::{Candidate, across};
+use super::ransac::Candidate;
 use crate::Vec3;
-use crate::cad::primitives::Primitive;
+use crate::cad::primitives::{Primitive, across};
 use crate::mesh::{Bvh, Winding};
 
 /// A through bore with the sleeve of material around it that is to be kept.

@@ -3,7 +3,7 @@
 use super::RecogniseOptions;
 use super::facets::{Facets, NONE};
 use crate::Vec3;
-use crate::cad::primitives::{Primitive, fit_cylinder, fit_plane};
+use crate::cad::primitives::{Primitive, across, fit_cylinder, fit_plane};
 use crate::monitor::{Cancelled, Monitor};
 
 /// A plane or a cylinder of the proposal.
@@ -549,17 +549,6 @@ fn measure(facets: &Facets, surface: Primitive, triangles: Vec<u32>) -> Option<C
         area,
     };
     (area > 0.0 && out.rms.is_finite()).then_some(out)
-}
-
-/// Two unit vectors across an axis.
-pub(super) fn across(direction: &Vec3) -> [Vec3; 2] {
-    let side = if direction.x.abs() < 0.8 {
-        Vec3::x()
-    } else {
-        Vec3::y()
-    };
-    let first = direction.cross(&side).normalize();
-    [first, direction.cross(&first)]
 }
 
 /// Angle of the circumference that the triangles cover, radians; counted in steps of a degree.

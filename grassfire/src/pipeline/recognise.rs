@@ -68,7 +68,7 @@ pub(super) fn recognise(
     } else {
         Vec::new()
     };
-    bodies.recognised = unite;
+    bodies.recognised = unite && !bodies.surface.triangles.is_empty();
     let listed = options.non_design.recognition.max_listed;
     found.candidates = table(&recognised, &united, unite, listed);
     Ok(found)

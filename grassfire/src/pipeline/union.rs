@@ -43,7 +43,7 @@ pub(super) fn part(
     monitor: &Monitor,
 ) -> Result<Part, StageError> {
     let mut solid = cad::build(&surface.brep, &bodies.solids, &options.cad, monitor)?;
-    if !solid.valid && bodies.recognised && !bodies.solids.is_empty() {
+    if !solid.valid && bodies.recognised {
         monitor.warn(
             "cad",
             format!(
