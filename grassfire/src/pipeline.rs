@@ -3,6 +3,7 @@
 //! A newcomer reads [`reconstruct`]: every stage is one call, its result one value that the next stage takes.
 
 mod bodies;
+mod construct;
 mod deliver;
 mod error;
 mod illustrate;
@@ -28,12 +29,13 @@ use crate::medial::{self, MedialOptions, PoleOptions};
 use crate::mesh::RepairOptions;
 use crate::monitor::Monitor;
 use crate::radii::RadiiOptions;
-use crate::remesh::{RemeshOptions, WrapOptions};
+use crate::remesh::{CutOutOptions, RemeshOptions, WrapOptions};
 use crate::report::{Report, ReportOptions};
 use crate::skeleton::SkeletonOptions;
 use crate::spline::{BrepOptions, PatchOptions, TessellateOptions};
 use crate::thicken::ThickenOptions;
 
+use construct::{Made, Site};
 use deliver::Delivery;
 use record::Record;
 
@@ -51,6 +53,8 @@ pub struct ReconstructOptions {
     pub repair: RepairOptions,
     /// Voxel remesh and topological noise.
     pub remesh: RemeshOptions,
+    /// Cutting non-design bodies out of the proposal.
+    pub cut_out: CutOutOptions,
     /// Medial axis.
     pub medial: MedialOptions,
     /// Pole skeleton and wall thickness.
@@ -111,12 +115,14 @@ pub struct Outcome {
 ///
 /// 1. Reads the proposal and the non-design bodies; repairs the mesh; recognises bores and bosses in it.
 /// 2. Remeshes it on voxels to a closed solid and removes topological noise.
-/// 3. Computes wall thickness (poles) and the pruned medial axis.
-/// 4. Builds the quad skeleton (or reads the given one), maps and smooths its radii.
-/// 5. Thickens it and fits the limit surface to the proposal; near given non-design bodies it ends inside their walls.
-/// 6. Builds the G1 faces and the boundary representation.
-/// 7. Builds the CAD solid, unites it with the non-design bodies, checks it.
-/// 8. Measures distance and volume, draws the pictures, writes the report.
+/// 3. Computes wall thickness (poles).
+/// 4. Cuts the non-design bodies out; steps 5 to 8 are done with what is left, and once more with the whole proposal when
+///    that does not give a valid union.
+/// 5. Computes the pruned medial axis; builds the quad skeleton (or reads the given one), maps and smooths its radii.
+/// 6. Thickens it and fits the limit surface to the proposal.
+/// 7. Builds the G1 faces and the boundary representation.
+/// 8. Builds the CAD solid, unites it with the non-design bodies, checks it.
+/// 9. Measures distance and volume, draws the pictures, writes the report.
 ///
 /// Files are written as their stage ends, each atomically; nothing is written when the input is refused.
 ///
@@ -143,7 +149,6 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         inputs::remesh(&proposal, &bodies, options, monitor)
     })?;
     record.report.remesh = Some(measure::remesh_block(&remeshed));
-    let voxel = remeshed.field.spacing;
     let delivery = record.stage("write", || Delivery::open(&job.output))?;
     record.stage("write", || delivery.proposal(&remeshed.solid))?;
 
@@ -151,45 +156,16 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         medial::poles(&remeshed.solid, &options.poles, monitor)
     })?;
     record.stage("write", || delivery.poles(&poles, &remeshed.solid))?;
-    let axis = record.stage("medial", || {
-        medial::medial_axis(&remeshed.field, &options.medial, monitor)
-    })?;
-    record.stage("write", || delivery.medial(&axis.mesh))?;
-
-    let shape = shape::shape(
-        &mut record,
-        &axis,
-        &remeshed,
-        &bodies.bosses,
-        drawn.as_ref(),
+    let site = Site {
+        record: &mut record,
+        remeshed: &remeshed,
+        bodies: &mut bodies,
+        drawn: drawn.as_ref(),
+        delivery: &delivery,
         options,
         monitor,
-    )?;
-    record.report.topology = Some(measure::topology_block(&axis, &shape));
-    record.report.skeleton = Some(measure::skeleton_block(&axis, &shape));
-    record.report.body = Some(measure::body_block(&shape));
-    record.stage("write", || delivery.skeleton(&shape.skeleton.skeleton))?;
-    record.stage("write", || delivery.body(&shape.fitted.mesh))?;
-
-    let mesh = &shape.fitted.mesh;
-    let surface = record.stage("spline", || shape::surface(mesh, voxel, options, monitor))?;
-    record.stage("write", || {
-        delivery.stl("body.stl", &surface.tessellation.mesh)
-    })?;
-    let intersections = shape.fitted.self_intersections.len();
-    if shape.wrapped || intersections > 0 {
-        bodies.drop_recognised(monitor);
-    }
-    let part = record.stage("cad", || {
-        union::part(
-            &surface,
-            &mut bodies,
-            intersections,
-            voxel,
-            options,
-            monitor,
-        )
-    })?;
+    };
+    let Made { axis, shape, part } = { site }.build()?;
     if part.non_design.is_empty() {
         recognise::left_out(&mut record.report.candidates);
     }

@@ -49,7 +49,9 @@ pub struct NonDesignOptions {
     pub sharp_angle: f64,
     /// Open bores are kept free beyond their ends by this many radii.
     pub bore_extension: f64,
-    /// The fitted body ends this many voxels inside the walls of the bodies that were given, so that their union cuts
+    /// Non-design bodies are cut out of the proposal before the skeleton is made; members end in their walls.
+    pub cut_out: bool,
+    /// Where that is off or does not work, the fitted body ends this many voxels inside the walls of the bodies that were given, so that their union cuts
     /// cleanly; 0 lets it follow the proposal there too.
     pub clearance: f64,
     /// What is done with bodies that are recognised in the proposal.
@@ -66,6 +68,7 @@ impl Default for NonDesignOptions {
             mesh_tolerance: 0.02,
             sharp_angle: 25.0,
             bore_extension: 1.0,
+            cut_out: true,
             clearance: 1.0,
             recognise: RecogniseMode::default(),
             recognition: RecogniseOptions::default(),

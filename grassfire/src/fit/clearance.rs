@@ -3,18 +3,9 @@
 use rayon::prelude::*;
 
 use crate::Vec3;
-use crate::mesh::{Bvh, TriMesh, Winding};
-use crate::remesh::Capsule;
+use crate::mesh::{Bvh, Winding};
+use crate::remesh::{Bosses, Capsule};
 use crate::voxel::VoxelGrid;
-
-/// The non-design bodies as the fit sees them.
-#[derive(Debug, Clone, Default)]
-pub struct Bosses {
-    /// Their closed surfaces, bores filled.
-    pub surface: TriMesh,
-    /// The walls of their bores: a cylinder about `a`-`b` each.
-    pub bores: Vec<Capsule>,
-}
 
 /// Near the bodies distances are exact up to this many voxels; what lies deeper is left alone.
 const REACH: f64 = 4.0;
@@ -94,6 +85,7 @@ fn into_bore(bore: &Capsule, p: &Vec3, depth: f64, voxel: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::TriMesh;
 
     fn grid(f: impl Fn(&Vec3) -> f64) -> VoxelGrid<f32> {
         let mut grid = VoxelGrid::filled(Vec3::repeat(-12.0), 0.5, [49, 49, 49], 0.0_f32);
@@ -134,7 +126,7 @@ mod tests {
         let proposal = |p: &Vec3| (5.0 - p.norm()).max(2.0 - p.yz().norm());
         let bosses = Bosses {
             surface: ball(5.0),
-            bores: Vec::new(),
+            ..Bosses::default()
         };
         let cleared = clear_of(&grid(proposal), &bosses, 0.5);
         // The wall's own surface has moved in by the depth, away from the member.
@@ -155,7 +147,15 @@ mod tests {
         }
         let (a, b) = (Vec3::new(0.0, 0.0, -11.0), Vec3::new(0.0, 0.0, 11.0));
         let bores = vec![Capsule { a, b, radius: 3.0 }];
-        let cleared = clear_of(&grid(proposal), &Bosses { surface, bores }, 0.5);
+        let cleared = clear_of(
+            &grid(proposal),
+            &Bosses {
+                surface,
+                bores,
+                ..Bosses::default()
+            },
+            0.5,
+        );
         assert!(cleared.sample(&Vec3::new(2.6, 0.0, 0.0)) > 0.0);
         assert!(cleared.sample(&Vec3::new(2.3, 0.0, 0.0)) < 0.0);
         assert!((cleared.sample(&Vec3::new(5.5, 0.0, 0.0))).abs() < 0.1);

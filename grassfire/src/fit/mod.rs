@@ -8,7 +8,7 @@ mod tangles;
 mod targets;
 mod untangle;
 
-pub use clearance::{Bosses, clear_of};
+pub use clearance::clear_of;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -52,7 +52,7 @@ impl Default for RecogniseOptions {
             tries: 12,
             min_area: 30.0,
             min_bore_angle: 300.0,
-            min_wall_angle: 180.0,
+            min_wall_angle: 120.0,
             sleeve_share: 0.6,
             end_gap: 0.25,
             max_listed: 40,

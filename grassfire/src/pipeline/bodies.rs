@@ -5,12 +5,11 @@ use super::error::StageError;
 use crate::Vec3;
 #[cfg(feature = "occt")]
 use crate::cad::{self, NonDesignBody};
-use crate::fit::Bosses;
 #[cfg(feature = "occt")]
 use crate::io::{self, Input};
 use crate::mesh::{Bvh, TriMesh};
 use crate::monitor::Monitor;
-use crate::remesh::Capsule;
+use crate::remesh::{Bosses, Capsule};
 #[cfg(feature = "occt")]
 use grassfire_occt::Triangulation;
 
@@ -26,12 +25,9 @@ pub(super) struct Bodies {
     /// Exact solids.
     #[cfg(feature = "occt")]
     pub(super) solids: Vec<NonDesignBody>,
-    /// Their surfaces, one mesh for all.
+    /// Their surfaces, one mesh for all; the tag of a triangle is the number of its body.
     pub(super) surface: TriMesh,
-    /// Their bores with the length that is kept free.
-    pub(super) bores: Vec<Capsule>,
-    /// The given ones with their bores filled, as the fit sees them. Recognised ones are made from the proposal's own
-    /// walls, which are not thick enough for a body to end inside them.
+    /// The same with their bores filled, as cutting and fitting see them.
     pub(super) bosses: Bosses,
     /// Nobody gave them: the part may be made without them.
     #[cfg_attr(
@@ -59,13 +55,19 @@ impl Bodies {
 
     /// Surfaces and bores of the bodies from number `first` on.
     fn measure(&mut self, first: usize) -> Result<(), StageError> {
-        for body in &self.solids[first..] {
+        for (number, body) in self.solids.iter().enumerate().skip(first) {
             let mesh = body
                 .solid
                 .tessellate(CHORD, FACET)
                 .map_err(cad::CadError::from)?;
-            append(&mut self.surface, &mesh);
-            self.bores.extend(body.bores.iter().map(kept_free));
+            append(&mut self.surface, &mesh, number);
+            let mesh = body
+                .boss
+                .tessellate(CHORD, FACET)
+                .map_err(cad::CadError::from)?;
+            append(&mut self.bosses.surface, &mesh, number);
+            self.bosses.bores.extend(body.bores.iter().map(wall));
+            self.bosses.free.extend(body.bores.iter().map(kept_free));
         }
         Ok(())
     }
@@ -77,7 +79,7 @@ impl Bodies {
         let nearest = (!self.surface.triangles.is_empty()).then(|| Bvh::new(&self.surface));
         Region {
             nearest,
-            bores: &self.bores,
+            bores: &self.bosses.free,
             margin,
         }
     }
@@ -150,14 +152,6 @@ pub(super) fn read(job: &ReconstructJob, monitor: &Monitor) -> Result<Bodies, St
         bodies.solids.extend(solids);
     }
     bodies.measure(0)?;
-    for body in &bodies.solids {
-        let mesh = body
-            .boss
-            .tessellate(CHORD, FACET)
-            .map_err(cad::CadError::from)?;
-        append(&mut bodies.bosses.surface, &mesh);
-        bodies.bosses.bores.extend(body.bores.iter().map(wall));
-    }
     Ok(bodies)
 }
 
@@ -171,11 +165,12 @@ pub(super) fn read(job: &ReconstructJob, _monitor: &Monitor) -> Result<Bodies, S
 }
 
 #[cfg(feature = "occt")]
-fn append(to: &mut TriMesh, mesh: &Triangulation) {
+fn append(to: &mut TriMesh, mesh: &Triangulation, number: usize) {
     let before = to.points.len() as u32;
     to.points.extend(mesh.points.iter().map(|p| Vec3::from(*p)));
     let triangles = mesh.triangles.iter().map(|t| t.map(|v| v + before));
     to.triangles.extend(triangles);
+    to.tags.resize(to.triangles.len(), number as u32);
 }
 
 /// The wall of a bore.

@@ -13,7 +13,7 @@ use crate::skeleton::Skeleton;
 use crate::spline::ControlMesh;
 
 /// All files that a reconstruction may write, and what they hold.
-const FILES: [(&str, &str); 12] = [
+const FILES: [(&str, &str); 13] = [
     ("part.step", "the solid, STEP AP242"),
     ("part.stl", "the solid, triangles"),
     ("body.obj", "closed quad control mesh of the body"),
@@ -23,6 +23,10 @@ const FILES: [(&str, &str); 12] = [
     ("poles.ply", "pole skeleton with radii"),
     ("thickness.ply", "proposal with wall thickness"),
     ("proposal.stl", "remeshed proposal"),
+    (
+        "design_part.stl",
+        "remeshed proposal without its non-design bodies",
+    ),
     ("report.html", "report to read"),
     ("report.json", "report for programs"),
     ("manifest.json", "inputs, versions, times"),
@@ -41,19 +45,29 @@ impl Delivery {
             source,
         };
         std::fs::create_dir_all(folder).map_err(|e| fail(folder, e))?;
-        for (name, _) in FILES {
-            let path = folder.join(name);
-            if path.exists() {
-                std::fs::remove_file(&path).map_err(|e| fail(&path, e))?;
-            }
-        }
-        Ok(Self {
+        let delivery = Self {
             folder: folder.to_owned(),
-        })
+        };
+        for (name, _) in FILES {
+            delivery.remove(name)?;
+        }
+        Ok(delivery)
     }
 
     pub(super) fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
+    }
+
+    /// Takes away a file that an attempt left which was given up.
+    pub(super) fn remove(&self, name: &str) -> Result<(), IoError> {
+        let path = self.path(name);
+        if !path.exists() {
+            return Ok(());
+        }
+        std::fs::remove_file(&path).map_err(|source| IoError::Write {
+            file: path.display().to_string(),
+            source,
+        })
     }
 
     pub(super) fn proposal(&self, solid: &Solid) -> Result<(), IoError> {

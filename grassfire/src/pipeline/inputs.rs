@@ -141,7 +141,7 @@ pub(super) fn remesh(
     let mut remesh_options = options.remesh.clone();
     remesh_options
         .keep_open
-        .extend(bodies.bores.iter().copied());
+        .extend(bodies.bosses.free.iter().copied());
     Ok(match proposal {
         Proposal::Mesh { mesh, .. } => crate::remesh::remesh(mesh, &remesh_options, monitor)?,
         Proposal::Density { grid, .. } => {

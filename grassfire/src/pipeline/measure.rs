@@ -11,7 +11,7 @@ use crate::report::{
     BodyBlock, CornerDeviation, DistanceBlock, RadiusRange, RemeshBlock, SkeletonBlock,
     TopologyBlock, VolumeBlock,
 };
-use crate::topology::SurfaceTopology;
+use crate::topology::{Betti, SurfaceTopology};
 
 /// The non-design region reaches this far from the bodies, voxels: there the proposal is not the reference.
 pub(super) const REGION_MARGIN: f64 = 2.0;
@@ -30,7 +30,11 @@ pub(super) fn remesh_block(remeshed: &Remeshed) -> RemeshBlock {
     }
 }
 
-pub(super) fn topology_block(axis: &MedialAxis, shape: &Shape) -> TopologyBlock {
+pub(super) fn topology_block(
+    axis: &MedialAxis,
+    shape: &Shape,
+    united: Option<Betti>,
+) -> TopologyBlock {
     // The thickening has asserted that every body is closed, oriented and manifold.
     let surface = |body: &crate::thicken::BodyTopology| SurfaceTopology {
         chi: body.chi,
@@ -43,6 +47,7 @@ pub(super) fn topology_block(axis: &MedialAxis, shape: &Shape) -> TopologyBlock 
         complex: axis.complex,
         skeleton: shape.skeleton.topology,
         body: shape.body.bodies.iter().map(surface).collect(),
+        united,
     }
 }
 
@@ -91,7 +96,7 @@ pub(super) fn body_block(shape: &Shape) -> BodyBlock {
 }
 
 /// Distance between the part and the remeshed proposal, both ways, away from the non-design region.
-pub(super) fn deviation(
+pub(super) fn distance_to(
     remeshed: &Remeshed,
     part: &Part,
     bodies: &Bodies,
@@ -101,12 +106,23 @@ pub(super) fn deviation(
     let voxel = remeshed.field.spacing;
     let region = bodies.region(REGION_MARGIN * voxel);
     let ignore = |p: &crate::Vec3| region.contains(p);
-    let distance = two_sided(
+    Ok(two_sided(
         &part.mesh,
         remeshed.solid.mesh(),
         &DistanceOptions::default(),
         Some(&ignore),
-    );
+    ))
+}
+
+/// As [`distance_to`], with a warning for places far off.
+pub(super) fn deviation(
+    remeshed: &Remeshed,
+    part: &Part,
+    bodies: &Bodies,
+    monitor: &Monitor,
+) -> Result<Distance, Cancelled> {
+    let voxel = remeshed.field.spacing;
+    let distance = distance_to(remeshed, part, bodies, monitor)?;
     for (place, mm) in distance
         .worst
         .iter()

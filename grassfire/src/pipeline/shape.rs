@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::ReconstructOptions;
 use super::error::{PipelineError, StageError};
 use super::record::Record;
-use crate::fit::{Bosses, Fitted, clear_of, fit};
+use crate::fit::{Fitted, fit};
 use crate::medial::MedialAxis;
 use crate::monitor::Monitor;
 use crate::radii;
@@ -31,7 +31,7 @@ pub struct RetryOptions {
 impl Default for RetryOptions {
     fn default() -> Self {
         Self {
-            quad_sizes: vec![1.0, 0.8, 1.3],
+            quad_sizes: vec![1.0, 0.8, 1.3, 0.6],
         }
     }
 }
@@ -65,26 +65,23 @@ struct Workshop<'a> {
     monitor: &'a Monitor,
 }
 
-/// Skeleton, thickening and fit; the first body that is sound and close enough wins, else the best of all tries. When
-/// none is sound, or all are far off, the body is wrapped around the proposal instead.
+/// Skeleton, thickening and fit to `target`; the first body that is sound and close enough wins, else the best of all
+/// tries. When none is sound, or all are far off, and `may_wrap`, the body is wrapped around the proposal instead.
 pub(super) fn shape(
     record: &mut Record,
     axis: &MedialAxis,
     remeshed: &Remeshed,
-    bosses: &Bosses,
+    target: &VoxelGrid<f32>,
+    may_wrap: bool,
     drawn: Option<&Skeleton>,
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Shape, PipelineError> {
-    let clearance = options.non_design.clearance * remeshed.field.spacing;
-    let target = record.stage("fit", || {
-        Ok::<_, StageError>(clear_of(&remeshed.field, bosses, clearance))
-    })?;
     let mut workshop = Workshop {
         record,
         axis,
         remeshed,
-        target: &target,
+        target,
         drawn,
         options,
         monitor,
@@ -94,7 +91,7 @@ pub(super) fn shape(
         Ok((score, _)) => score.usable(),
         Err(error) => error.is_cancelled() || options.retry.quad_sizes.is_empty(),
     };
-    if finished || drawn.is_some() {
+    if finished || drawn.is_some() || !may_wrap {
         return tried.map(|(_, shape)| shape);
     }
     let first = tried.as_ref().ok().map(|(_, shape)| shape.skeleton.clone());
@@ -125,6 +122,10 @@ impl Workshop<'_> {
             source: StageError::NoQuadSize,
         });
         for (attempt, &size) in sizes.iter().enumerate() {
+            // Coarser quads may get rid of crossings, but never of distance.
+            if size > 1.0 && best.as_ref().is_ok_and(|(score, _)| score.sound()) {
+                continue;
+            }
             let name = format!("try {} (quad size x {size})", attempt + 1);
             match self.one(size) {
                 Ok((score, shape)) if score.good() => return Ok((score, shape)),
@@ -250,13 +251,17 @@ impl Score {
         }
     }
 
+    fn sound(&self) -> bool {
+        self.crossings + self.folds == 0
+    }
+
     fn good(&self) -> bool {
-        self.crossings + self.folds == 0 && self.excess <= 1.0
+        self.sound() && self.excess <= 1.0
     }
 
     /// Sound, and not so far off that a body without a skeleton would serve better.
     fn usable(&self) -> bool {
-        self.crossings + self.folds == 0 && self.excess <= USABLE
+        self.sound() && self.excess <= USABLE
     }
 
     /// So far off that other quad sizes do not help: the part is not made of sheets and members.
@@ -267,6 +272,13 @@ impl Score {
     /// Orders tries: soundness first, then closeness.
     fn worse(&self) -> (usize, usize, f64) {
         (self.crossings, self.folds, self.excess)
+    }
+}
+
+impl Shape {
+    /// The body neither cuts itself nor folds over.
+    pub(super) fn sound(&self) -> bool {
+        self.fitted.self_intersections.is_empty() && flipped(&self.fitted) == 0
     }
 }
 

@@ -9,6 +9,7 @@ use crate::cad::{self, CadSolid, NonDesignResult, StepOptions};
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
 use crate::report::{NonDesignBlock, SolidBlock};
+use crate::topology::Betti;
 
 /// The finished part.
 pub(super) struct Part {
@@ -30,9 +31,24 @@ pub(super) struct Part {
 #[cfg(feature = "occt")]
 const CHORD: f64 = 0.05;
 
-/// Builds the CAD solid, unites it with the non-design bodies and checks it. `intersections` is how often the fitted
-/// body cuts itself: such a solid is never called valid, whatever the kernel says. Recognised bodies are taken away when no
-/// union with them is valid.
+impl Part {
+    /// What speaks against this part of topology `wanted`, when anything does.
+    pub(super) fn problem(&self, wanted: &Betti) -> Option<String> {
+        let block = self.block.as_ref()?;
+        if !block.valid {
+            Some("no union with the non-design bodies is valid".to_owned())
+        } else if (block.bodies as i64, block.genus) != (wanted.b0, wanted.b1) {
+            Some(format!(
+                "the union has {} bodies and {} tunnels instead of {} and {}",
+                block.bodies, block.genus, wanted.b0, wanted.b1
+            ))
+        } else {
+            None
+        }
+    }
+}
+
+/// As [`united`], but recognised bodies are taken away when no union with them is valid.
 #[cfg(feature = "occt")]
 pub(super) fn part(
     surface: &Surface,
@@ -42,19 +58,34 @@ pub(super) fn part(
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Part, StageError> {
-    let mut solid = cad::build(&surface.brep, &bodies.solids, &options.cad, monitor)?;
-    if !solid.valid && bodies.recognised {
-        monitor.warn(
-            "cad",
-            format!(
-                "the {} recognised bodies could not be united and are left out: {}",
-                bodies.solids.len(),
-                solid.messages.join("; ")
-            ),
-        );
-        *bodies = Bodies::default();
-        solid = cad::build(&surface.brep, &[], &options.cad, monitor)?;
+    let part = united(surface, bodies, intersections, voxel, options, monitor)?;
+    if part.solid.valid || !bodies.recognised {
+        return Ok(part);
     }
+    monitor.warn(
+        "cad",
+        format!(
+            "the {} recognised bodies could not be united and are left out: {}",
+            bodies.solids.len(),
+            part.solid.messages.join("; ")
+        ),
+    );
+    *bodies = Bodies::default();
+    united(surface, bodies, intersections, voxel, options, monitor)
+}
+
+/// Builds the CAD solid, unites it with the non-design bodies and checks it. `intersections` is how often the fitted
+/// body cuts itself: such a solid is never called valid, whatever the kernel says.
+#[cfg(feature = "occt")]
+pub(super) fn united(
+    surface: &Surface,
+    bodies: &Bodies,
+    intersections: usize,
+    voxel: f64,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Part, StageError> {
+    let mut solid = cad::build(&surface.brep, &bodies.solids, &options.cad, monitor)?;
     for message in &solid.messages {
         monitor.warn("cad", message.clone());
     }
@@ -119,11 +150,24 @@ pub(super) fn deliver(part: &Part, product: &str, delivery: &Delivery) -> Result
     Ok(delivery.stl("part.stl", &part.mesh)?)
 }
 
-/// Without OpenCASCADE the part is the limit surface of the body.
+/// Without OpenCASCADE there are no bodies to take away.
 #[cfg(not(feature = "occt"))]
 pub(super) fn part(
     surface: &Surface,
-    _bodies: &mut Bodies,
+    bodies: &mut Bodies,
+    intersections: usize,
+    voxel: f64,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Part, StageError> {
+    united(surface, bodies, intersections, voxel, options, monitor)
+}
+
+/// Without OpenCASCADE the part is the limit surface of the body.
+#[cfg(not(feature = "occt"))]
+pub(super) fn united(
+    surface: &Surface,
+    _bodies: &Bodies,
     _intersections: usize,
     _voxel: f64,
     _options: &ReconstructOptions,

@@ -5,6 +5,7 @@ mod cases;
 mod closing;
 mod compose;
 mod crossings;
+mod cut_out;
 mod density;
 mod deviation;
 mod digital;
@@ -25,6 +26,7 @@ mod tunnels;
 mod vanished;
 mod wrap;
 
+pub use cut_out::{Bosses, CutOutOptions, DesignPart, cut_out};
 pub use error::RemeshError;
 pub use options::{Capsule, RemeshOptions};
 pub use resolution::default_voxel;
@@ -81,6 +83,8 @@ pub struct Remeshed {
     pub changes: Vec<TopologyChange>,
     /// Largest distance from the input surface (away from `changes`) to the new one, mm.
     pub distance_max: f64,
+    /// Spacing of the grid that the input came from, mm, where that can be seen.
+    pub source: Option<f64>,
 }
 
 /// Remeshes a triangle soup with good orientation (repaired, but holes, duplicates, overlaps and cracks are allowed).
@@ -263,6 +267,7 @@ fn remesh_on(
         genus_after: after.b1,
         changes: noise.changes,
         distance_max,
+        source,
     })
 }
 

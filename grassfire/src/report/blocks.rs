@@ -161,6 +161,10 @@ pub struct TopologyBlock {
     /// Every closed surface of the thickened body.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub body: Vec<SurfaceTopology>,
+    /// What the union with the non-design bodies must have, when these were cut out of the proposal before the skeleton;
+    /// the rows above are then those of the design part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub united: Option<Betti>,
 }
 
 /// The quad skeleton.

@@ -147,7 +147,10 @@ fn solid(report: &Report, limits: &Limits, checks: &mut Vec<Check>) {
         "Solid is valid for the CAD kernel",
         !solid.valid,
     ));
-    let pieces = report.topology.as_ref().map_or(1, |t| t.solid.b0.max(1)) as f64;
+    let topology = report.topology.as_ref();
+    let united = topology.and_then(|t| t.united);
+    let whole = united.or(topology.map(|t| t.solid));
+    let pieces = whole.map_or(1, |t| t.b0.max(1)) as f64;
     checks.push(check(
         "solid.bodies",
         "Separate bodies, no more than the proposal has",
@@ -155,6 +158,11 @@ fn solid(report: &Report, limits: &Limits, checks: &mut Vec<Check>) {
         pieces,
         "",
     ));
+    if let Some(united) = united {
+        let off = (solid.genus - united.b1).unsigned_abs() as f64;
+        let text = "Tunnels of the union, as many as proposal and non-design bodies have";
+        checks.push(check("solid.genus", text, off, 0.0, DEFECTS));
+    }
     if solid.bodies == 0 {
         checks.push(defect("solid.empty", "Solid has a body", true));
     }

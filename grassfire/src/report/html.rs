@@ -239,7 +239,7 @@ fn topology(block: &TopologyBlock) -> Markup {
     ];
     html! {
         h2 { "Topology" }
-        p .soft { "Solid, complex and skeleton must agree; the closed surface of the body has twice their Euler number." }
+        p .soft { "Solid, complex and skeleton must agree; the closed surface of the body has twice their Euler number. Where non-design bodies were cut out before the skeleton these are the figures of what was left." }
         div .scroll { table {
             thead { tr {
                 th { "Stage" } th .n { "Pieces" } th .n { "Tunnels" } th .n { "Cavities" } th .n { "Euler number" } th { "" }
@@ -247,6 +247,9 @@ fn topology(block: &TopologyBlock) -> Markup {
             tbody {
                 @for (name, betti) in rows {
                     tr { td { (name) } (betti_cells(betti)) td { (agreement(betti == block.solid)) } }
+                }
+                @if let Some(united) = block.united {
+                    tr { td { "Union with the non-design bodies, wanted" } (betti_cells(united)) td {} }
                 }
                 @if !block.body.is_empty() {
                     @let chi: i64 = block.body.iter().map(|surface| surface.chi).sum();

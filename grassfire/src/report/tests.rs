@@ -36,6 +36,7 @@ fn report() -> Report {
                 closed: true,
                 manifold: true,
             }],
+            united: None,
         }),
         skeleton: Some(SkeletonBlock::default()),
         body: Some(BodyBlock::default()),

@@ -1,0 +1,228 @@
+//! From the remeshed proposal to the finished part: without its non-design bodies where that works, else as a whole.
+
+use super::bodies::Bodies;
+use super::deliver::Delivery;
+use super::error::{PipelineError, StageError};
+use super::record::Record;
+use super::shape::{self, Shape};
+use super::union::{self, Part};
+use super::{ReconstructOptions, measure};
+use crate::fit::clear_of;
+use crate::medial::{self, MedialAxis};
+use crate::monitor::Monitor;
+use crate::remesh::{DesignPart, Remeshed, cut_out};
+use crate::skeleton::Skeleton;
+use crate::topology::Betti;
+use crate::voxel::VoxelGrid;
+
+/// What every way of making the part starts from.
+pub(super) struct Site<'a> {
+    pub(super) record: &'a mut Record,
+    pub(super) remeshed: &'a Remeshed,
+    pub(super) bodies: &'a mut Bodies,
+    /// A skeleton drawn elsewhere.
+    pub(super) drawn: Option<&'a Skeleton>,
+    pub(super) delivery: &'a Delivery,
+    pub(super) options: &'a ReconstructOptions,
+    pub(super) monitor: &'a Monitor,
+}
+
+/// The part with the stages before it.
+pub(super) struct Made {
+    pub(super) axis: MedialAxis,
+    pub(super) shape: Shape,
+    pub(super) part: Part,
+}
+
+/// What is made into a body: the design part or the whole proposal.
+struct Base<'a> {
+    remeshed: &'a Remeshed,
+    /// The field that the body is fitted to.
+    target: &'a VoxelGrid<f32>,
+    /// The topology of the union, when bodies were cut out.
+    united: Option<Betti>,
+}
+
+impl Site<'_> {
+    /// Makes the part.
+    ///
+    /// 1. Cuts the non-design bodies out of the proposal, makes the design part, unites it with them.
+    /// 2. When that gives no sound body or no valid union with the proposal's topology, or there are no bodies, the
+    ///    proposal is made as a whole; the body ends inside the walls of given bodies then. Recognised ones are left out
+    ///    when no union with them is valid.
+    pub(super) fn build(&mut self) -> Result<Made, PipelineError> {
+        match self.from_design_part() {
+            Ok(Some(made)) => return Ok(made),
+            Ok(None) => {}
+            Err(error) if error.is_cancelled() => return Err(error),
+            Err(error) => self.give_up(&format!("{} failed: {}", error.stage, error.source)),
+        }
+        self.as_a_whole()
+    }
+
+    fn give_up(&self, reason: &str) {
+        self.monitor.warn(
+            "cut_out",
+            format!("the part was made with its non-design bodies in the skeleton, because without them {reason}"),
+        );
+    }
+
+    fn from_design_part(&mut self) -> Result<Option<Made>, PipelineError> {
+        let (remeshed, options, monitor) = (self.remeshed, self.options, self.monitor);
+        if !options.non_design.cut_out {
+            return Ok(None);
+        }
+        let bosses = &self.bodies.bosses;
+        let design = self.record.stage("cut_out", || {
+            cut_out(remeshed, bosses, &options.cut_out, monitor)
+        })?;
+        let Some(DesignPart {
+            part,
+            united,
+            wanted,
+        }) = design
+        else {
+            return Ok(None);
+        };
+        if united != wanted {
+            self.give_up(&format!(
+                "the union would have {} pieces and {} tunnels instead of {} and {}",
+                united.b0, united.b1, wanted.b0, wanted.b1
+            ));
+            return Ok(None);
+        }
+        let delivery = self.delivery;
+        self.record.stage("write", || {
+            delivery.stl("design_part.stl", part.solid.mesh())
+        })?;
+        let base = Base {
+            remeshed: &part,
+            target: &part.field,
+            united: Some(wanted),
+        };
+        let (axis, shape) = self.shape(&base)?;
+        if !shape.sound() {
+            self.give_up("its body cuts itself or folds over");
+            return Ok(None);
+        }
+        let surface = self.surface(&shape)?;
+        let voxel = remeshed.field.spacing;
+        let bodies = &*self.bodies;
+        let part = self.record.stage("cad", || {
+            union::united(&surface, bodies, 0, voxel, options, monitor)
+        })?;
+        if let Some(problem) = part.problem(&wanted) {
+            self.give_up(&problem);
+            return Ok(None);
+        }
+        if let Some(problem) = self.too_far(&part)? {
+            self.give_up(&problem);
+            return Ok(None);
+        }
+        self.report(&axis, &shape, base.united);
+        Ok(Some(Made { axis, shape, part }))
+    }
+
+    /// By how much the part misses the limits for distance and volume, when it does.
+    fn too_far(&mut self, part: &Part) -> Result<Option<String>, PipelineError> {
+        let limits = &self.options.report.limits;
+        let (remeshed, bodies, monitor) = (self.remeshed, &*self.bodies, self.monitor);
+        let distance = self.record.stage("measure", || {
+            measure::distance_to(remeshed, part, bodies, monitor)
+        })?;
+        let voxel = remeshed.field.spacing;
+        let volume = measure::volume_block(remeshed, part)
+            .relative_difference
+            .abs();
+        let misses = distance.rms > limits.distance_rms * voxel
+            || distance.p95 > limits.distance_p95 * voxel
+            || volume > limits.volume;
+        Ok(misses.then(|| {
+            format!(
+                "the part is {:.2} voxels (rms) from the proposal, 95 % of it within {:.2} voxels, {:.1} % off in volume",
+                distance.rms / voxel,
+                distance.p95 / voxel,
+                100.0 * volume
+            )
+        }))
+    }
+
+    fn as_a_whole(&mut self) -> Result<Made, PipelineError> {
+        let (remeshed, options, monitor) = (self.remeshed, self.options, self.monitor);
+        let voxel = remeshed.field.spacing;
+        let delivery = self.delivery;
+        self.record
+            .stage("write", || delivery.remove("design_part.stl"))?;
+        let bodies = &*self.bodies;
+        let target = self.record.stage("fit", || {
+            let depth = options.non_design.clearance * voxel;
+            Ok::<_, StageError>(if bodies.recognised {
+                // They are made from the proposal's own walls, too thin for a body to end inside them.
+                remeshed.field.clone()
+            } else {
+                clear_of(&remeshed.field, &bodies.bosses, depth)
+            })
+        })?;
+        let base = Base {
+            remeshed,
+            target: &target,
+            united: None,
+        };
+        let (axis, shape) = self.shape(&base)?;
+        let surface = self.surface(&shape)?;
+        let intersections = shape.fitted.self_intersections.len();
+        if shape.wrapped || intersections > 0 {
+            self.bodies.drop_recognised(monitor);
+        }
+        let bodies = &mut *self.bodies;
+        let part = self.record.stage("cad", || {
+            union::part(&surface, bodies, intersections, voxel, options, monitor)
+        })?;
+        self.report(&axis, &shape, base.united);
+        Ok(Made { axis, shape, part })
+    }
+
+    /// Medial axis, skeleton and fitted body, each written as it is made.
+    fn shape(&mut self, base: &Base) -> Result<(MedialAxis, Shape), PipelineError> {
+        let (options, monitor, delivery) = (self.options, self.monitor, self.delivery);
+        let axis = self.record.stage("medial", || {
+            medial::medial_axis(&base.remeshed.field, &options.medial, monitor)
+        })?;
+        self.record.stage("write", || delivery.medial(&axis.mesh))?;
+        let may_wrap = base.united.is_none();
+        let shape = shape::shape(
+            self.record,
+            &axis,
+            base.remeshed,
+            base.target,
+            may_wrap,
+            self.drawn,
+            options,
+            monitor,
+        )?;
+        self.record
+            .stage("write", || delivery.skeleton(&shape.skeleton.skeleton))?;
+        self.record
+            .stage("write", || delivery.body(&shape.fitted.mesh))?;
+        Ok((axis, shape))
+    }
+
+    fn surface(&mut self, shape: &Shape) -> Result<shape::Surface, PipelineError> {
+        let (options, monitor, delivery) = (self.options, self.monitor, self.delivery);
+        let voxel = self.remeshed.field.spacing;
+        let surface = self.record.stage("spline", || {
+            shape::surface(&shape.fitted.mesh, voxel, options, monitor)
+        })?;
+        self.record.stage("write", || {
+            delivery.stl("body.stl", &surface.tessellation.mesh)
+        })?;
+        Ok(surface)
+    }
+
+    fn report(&mut self, axis: &MedialAxis, shape: &Shape, united: Option<Betti>) {
+        let report = &mut self.record.report;
+        report.topology = Some(measure::topology_block(axis, shape, united));
+        report.skeleton = Some(measure::skeleton_block(axis, shape));
+        report.body = Some(measure::body_block(shape));
+    }
+}

@@ -1,0 +1,617 @@
+//! The design part: the proposal without its non-design bodies, members running on into their walls.
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::digital::VoxelSet;
+use super::{Capsule, RemeshError, Remeshed, STAGE, compose, extract, noise};
+use crate::Vec3;
+use crate::mesh::{Bvh, Solid, TriMesh, Winding};
+use crate::monitor::Monitor;
+use crate::topology::Betti;
+use crate::voxel::VoxelGrid;
+
+/// Options of [`cut_out`], all lengths in voxels of the grid that the proposal came from or, where that is unknown or
+/// finer, of the remesh.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CutOutOptions {
+    /// Skin around a body that goes with it: the proposal's copy of its walls is never exact.
+    pub skin: f64,
+    /// Half of the least thickness that stays next to a body: thinner shells and burrs go.
+    pub least_half_thickness: f64,
+    /// Members run on this far into a body.
+    pub run_on: f64,
+    /// There they stay this far below faces of the body that lie open, so that the union cuts cleanly.
+    pub clearance: f64,
+    /// Gaps between material and a body that no ball of this radius fits into are filled.
+    pub slot: f64,
+    /// Separate pieces of less than a cube of this edge are crumbs of the bodies' walls and go.
+    pub island: f64,
+    /// Tunnels and bridges of the design part narrower than this come from the cutting and go.
+    pub noise: f64,
+}
+
+impl Default for CutOutOptions {
+    fn default() -> Self {
+        Self {
+            skin: 0.5,
+            least_half_thickness: 0.6,
+            run_on: 1.5,
+            clearance: 1.0,
+            slot: 1.25,
+            island: 4.0,
+            noise: 2.0,
+        }
+    }
+}
+
+/// Non-design bodies as cutting and fitting see them.
+#[derive(Debug, Clone, Default)]
+pub struct Bosses {
+    /// Their closed surfaces, bores filled; the tag of a triangle is the number of its body.
+    pub surface: TriMesh,
+    /// The walls of their bores: a cylinder about `a`-`b` each.
+    pub bores: Vec<Capsule>,
+    /// The lengths of the bores that stay free of material, likewise.
+    pub free: Vec<Capsule>,
+}
+
+/// The proposal without its non-design bodies.
+#[derive(Debug, Clone)]
+pub struct DesignPart {
+    /// What is left, as a closed surface, field and list of changes; distances and genus before are those of the proposal.
+    pub part: Remeshed,
+    /// Topology of design part and bodies together, bores open.
+    pub united: Betti,
+    /// Topology of proposal and bodies together, bores open: what the union must have.
+    pub wanted: Betti,
+}
+
+/// The options in mm, and how far around the bodies distances are needed.
+struct Lengths {
+    skin: f64,
+    least_half_thickness: f64,
+    run_on: f64,
+    clearance: f64,
+    slot: f64,
+    island: f64,
+    noise: f64,
+    reach: f64,
+}
+
+impl Lengths {
+    fn new(options: &CutOutOptions, proposal: &Remeshed) -> Self {
+        let voxel = proposal.field.spacing;
+        let unit = voxel.max(proposal.source.unwrap_or(0.0));
+        let skin = options.skin * unit;
+        let least_half_thickness = options.least_half_thickness * unit;
+        Self {
+            skin,
+            least_half_thickness,
+            run_on: options.run_on * unit,
+            clearance: options.clearance * voxel,
+            slot: options.slot * voxel,
+            island: options.island * unit,
+            noise: options.noise * unit,
+            reach: skin + 2.0 * least_half_thickness + 4.0 * voxel,
+        }
+    }
+}
+
+/// Balls about voxel centres do not quite cover what they should: so much is forgiven, voxels.
+const FORGIVEN: f64 = 0.4;
+/// Empty voxels around everything.
+const MARGIN: usize = 3;
+
+/// Cuts non-design bodies out of a remeshed proposal; `None` without bodies or when nothing is left.
+///
+/// 1. The bodies with a skin, and the free lengths of their bores, are taken away from the solid.
+/// 2. What is thinner than twice `least_half_thickness` next to them goes too: shells left of their walls, burrs.
+/// 3. Where material meets a body it runs on `run_on` deep into its wall, but stays `clearance` below the proposal's own
+///    surface, so that it ends inside and the union's edges are transversal.
+/// 4. Topological noise that the cutting made is removed; the surface is extracted anew.
+///
+/// The Euler numbers of `united` and `wanted` tell whether the union still has the proposal's topology. Deterministic for
+/// every number of threads.
+///
+/// # Errors
+/// [`RemeshError::Surface`], [`RemeshError::Topology`], cancelled.
+pub fn cut_out(
+    proposal: &Remeshed,
+    bosses: &Bosses,
+    options: &CutOutOptions,
+    monitor: &Monitor,
+) -> Result<Option<DesignPart>, RemeshError> {
+    let Some((lo, hi)) = bosses.surface.bounds() else {
+        return Ok(None);
+    };
+    monitor.step(STAGE, "cutting out non-design bodies", 0.0)?;
+    let whole = padded(&proposal.field, &lo, &hi);
+    let lengths = Lengths::new(options, proposal);
+    let near = Near::new(&whole, bosses, &lengths);
+    let cut = near.cut(&whole, &lengths);
+    let opened = near.opened(&cut, &lengths);
+    let mut joined = near.joined(&whole, &opened, &lengths);
+    near.refresh(&mut joined, None, monitor)?;
+    let closed = near.closed(&whole, &joined, &lengths);
+    let together = |field: &VoxelGrid<f32>| near.together(field, lengths.skin).betti();
+    let wanted = together(&whole);
+    let mut best = None;
+    // Cleaning may close a tunnel that is needed: then less of it.
+    for share in [1.0, 0.5, 0.25, 0.0] {
+        let noise = share * lengths.noise;
+        let part = solid_of(
+            closed.clone(),
+            &near,
+            lengths.island,
+            noise,
+            proposal,
+            monitor,
+        )?;
+        let Some(part) = part else { continue };
+        let united = together(&part.field);
+        let found = united == wanted;
+        if found || best.is_none() {
+            best = Some(DesignPart {
+                part,
+                united,
+                wanted,
+            });
+        }
+        if found {
+            break;
+        }
+    }
+    Ok(best)
+}
+
+/// Voxels near the bodies with their depth in them.
+struct Near {
+    /// Index of each voxel, ascending.
+    voxels: Vec<u32>,
+    /// Depth in the bodies, mm, negative outside.
+    solid: Vec<f64>,
+    /// Depth in the free lengths of their bores.
+    free: Vec<f64>,
+}
+
+impl Near {
+    fn new(grid: &VoxelGrid<f32>, bosses: &Bosses, lengths: &Lengths) -> Self {
+        let reach = lengths.reach;
+        let boxes = boxes(bosses);
+        let bvh = Bvh::new(&bosses.surface);
+        let winding = Winding::new(&bvh);
+        let depth_at = |v: usize| {
+            let [i, j, k] = grid.ijk(v);
+            let p = grid.centre(i, j, k);
+            let close = |(lo, hi): &(Vec3, Vec3)| {
+                (0..3).all(|a| lo[a] - reach <= p[a] && p[a] <= hi[a] + reach)
+            };
+            if !boxes.iter().any(close) {
+                return None;
+            }
+            let distance = bvh.nearest(&p, reach).map_or(reach, |n| n.distance);
+            let inside = winding.at(&p) > 0.5;
+            let free = bosses.free.iter().map(|bore| in_bore(bore, &p));
+            let free = free.fold(-reach, f64::max);
+            let solid = if inside { distance } else { -distance };
+            (solid.max(free) > -reach).then_some((v as u32, solid, free))
+        };
+        let found: Vec<(u32, f64, f64)> = (0..grid.values.len())
+            .into_par_iter()
+            .filter_map(depth_at)
+            .collect();
+        Self {
+            voxels: found.iter().map(|f| f.0).collect(),
+            solid: found.iter().map(|f| f.1).collect(),
+            free: found.iter().map(|f| f.2).collect(),
+        }
+    }
+
+    /// Depth in a body or in the free length of a bore.
+    fn depth(&self, n: usize) -> f64 {
+        self.solid[n].max(self.free[n])
+    }
+
+    /// The field with the values of the near voxels replaced.
+    fn replaced(
+        &self,
+        field: &VoxelGrid<f32>,
+        value: impl Fn(usize, usize) -> f64 + Sync,
+    ) -> VoxelGrid<f32> {
+        let new: Vec<f32> = (0..self.voxels.len())
+            .into_par_iter()
+            .map(|n| value(n, self.voxels[n] as usize) as f32)
+            .collect();
+        let mut out = field.clone();
+        for (&v, value) in self.voxels.iter().zip(new) {
+            out.values[v as usize] = value;
+        }
+        out
+    }
+
+    fn cut(&self, whole: &VoxelGrid<f32>, lengths: &Lengths) -> VoxelGrid<f32> {
+        self.replaced(whole, |n, v| {
+            f64::from(whole.values[v]).min(-self.depth(n) - lengths.skin)
+        })
+    }
+
+    /// Opening by balls of at least the least half thickness, within the near voxels.
+    fn opened(&self, cut: &VoxelGrid<f32>, lengths: &Lengths) -> VoxelGrid<f32> {
+        let h = cut.spacing;
+        let radius = lengths.least_half_thickness;
+        let balls = balls(cut, radius / h + 2.0);
+        // Farther out nothing was cut, and not all the neighbours that the balls need are known.
+        let last = lengths.skin + 2.0 * radius;
+        self.replaced(cut, |n, v| {
+            let value = f64::from(cut.values[v]);
+            if value <= 0.0 || value >= radius || self.depth(n) < -last {
+                return value;
+            }
+            value.min(covered(cut, 1.0, &balls, v, radius) + FORGIVEN * h)
+        })
+    }
+
+    /// Lets the material run on into the bodies that it meets.
+    fn joined(
+        &self,
+        whole: &VoxelGrid<f32>,
+        opened: &VoxelGrid<f32>,
+        lengths: &Lengths,
+    ) -> VoxelGrid<f32> {
+        let h = opened.spacing;
+        let reach = lengths.skin + lengths.run_on;
+        let balls = balls(opened, reach / h + 1.5);
+        self.replaced(opened, |n, v| {
+            let value = f64::from(opened.values[v]);
+            if self.depth(n) < -lengths.skin - h || value > reach {
+                return value;
+            }
+            let below = f64::from(whole.values[v]) - lengths.clearance;
+            let room = below.min(-self.free[n]);
+            if room <= value {
+                return value;
+            }
+            let run_on = covered(opened, 1.0, &balls, v, 0.0) + reach;
+            value.max(run_on.min(room))
+        })
+    }
+
+    /// Fills gaps in and at the bodies that no ball of the slot's radius fits into.
+    fn closed(
+        &self,
+        whole: &VoxelGrid<f32>,
+        joined: &VoxelGrid<f32>,
+        lengths: &Lengths,
+    ) -> VoxelGrid<f32> {
+        let h = joined.spacing;
+        let balls = balls(joined, lengths.slot / h + 2.0);
+        self.replaced(joined, |n, v| {
+            let value = f64::from(joined.values[v]);
+            if value >= 0.0 || -value >= lengths.slot || self.depth(n) < -lengths.skin - h {
+                return value;
+            }
+            let empty = covered(joined, -1.0, &balls, v, lengths.slot) + FORGIVEN * h;
+            let room = f64::from(whole.values[v]).min(-self.free[n]);
+            value.max((-empty).min(room))
+        })
+    }
+
+    /// Distances of the near voxels, and of those that are touched besides, from the surface near them.
+    fn refresh(
+        &self,
+        field: &mut VoxelGrid<f32>,
+        besides: Option<&[bool]>,
+        monitor: &Monitor,
+    ) -> Result<VoxelSet, RemeshError> {
+        let mut touched = besides.map_or_else(|| vec![false; field.values.len()], <[bool]>::to_vec);
+        for &v in &self.voxels {
+            touched[v as usize] = true;
+        }
+        let set = VoxelSet::positive(field.dims, &field.values);
+        if set.solid.contains(&true) {
+            noise::refresh(field, &set, &touched, monitor)?;
+        }
+        Ok(set)
+    }
+
+    /// The voxels of a field and of the bodies with their skin together, without the free lengths of the bores.
+    fn together(&self, field: &VoxelGrid<f32>, skin: f64) -> VoxelSet {
+        let mut values = field.values.clone();
+        for (n, &v) in self.voxels.iter().enumerate() {
+            let value = &mut values[v as usize];
+            let body = self.solid[n] + skin;
+            *value = f64::from(*value).max(body).min(-self.free[n]) as f32;
+        }
+        VoxelSet::positive(field.dims, &values)
+    }
+}
+
+/// Steps of index to all voxels of a ball with their lengths, mm.
+fn balls(grid: &VoxelGrid<f32>, radius: f64) -> Vec<(isize, f64)> {
+    let n = radius.ceil() as isize;
+    let [nx, ny, _] = grid.dims.map(|d| d as isize);
+    let mut out = Vec::new();
+    for k in -n..=n {
+        for j in -n..=n {
+            for i in -n..=n {
+                let length = ((i * i + j * j + k * k) as f64).sqrt();
+                if length <= radius {
+                    out.push(((k * ny + j) * nx + i, length * grid.spacing));
+                }
+            }
+        }
+    }
+    out
+}
+
+/// How deep voxel `v` lies in the balls about the voxels around it, each as large as its value times `side`; only balls
+/// of at least `least` count. Negative outside all of them, at least the negative radius of the neighbourhood.
+fn covered(grid: &VoxelGrid<f32>, side: f64, around: &[(isize, f64)], v: usize, least: f64) -> f64 {
+    let far = around.iter().map(|s| s.1).fold(0.0, f64::max);
+    let mut best = -far;
+    for &(step, length) in around {
+        let Some(&value) = v.checked_add_signed(step).and_then(|n| grid.values.get(n)) else {
+            continue;
+        };
+        let value = side * f64::from(value);
+        if value > 0.0 && value >= least {
+            best = best.max(value - length);
+        }
+    }
+    best
+}
+
+/// Depth in a finite cylinder, mm, negative outside.
+fn in_bore(bore: &Capsule, p: &Vec3) -> f64 {
+    let axis = bore.b - bore.a;
+    let length = axis.norm();
+    if length <= 0.0 {
+        return f64::NEG_INFINITY;
+    }
+    let along = (p - bore.a).dot(&axis) / length;
+    let radial = (p - bore.a - axis * (along / length)).norm();
+    (bore.radius - radial).min(along).min(length - along)
+}
+
+/// The box of each body.
+fn boxes(bosses: &Bosses) -> Vec<(Vec3, Vec3)> {
+    let count = bosses.surface.tags.iter().max().map_or(0, |t| t + 1);
+    let none = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+    let mut out = vec![none; count as usize];
+    for (t, &tag) in bosses.surface.tags.iter().enumerate() {
+        let (lo, hi) = &mut out[tag as usize];
+        for p in bosses.surface.corners(t) {
+            *lo = lo.inf(&p);
+            *hi = hi.sup(&p);
+        }
+    }
+    out.extend(bosses.free.iter().map(|bore| {
+        let by = Vec3::repeat(bore.radius);
+        (bore.a.inf(&bore.b) - by, bore.a.sup(&bore.b) + by)
+    }));
+    out
+}
+
+/// The field with room for the bodies and a margin around them.
+fn padded(field: &VoxelGrid<f32>, lo: &Vec3, hi: &Vec3) -> VoxelGrid<f32> {
+    let (lo, hi) = (field.to_grid(lo), field.to_grid(hi));
+    let margin = MARGIN as f64;
+    let before: Vec<usize> = (0..3)
+        .map(|a| (margin - lo[a]).ceil().max(0.0) as usize)
+        .collect();
+    let after: Vec<usize> = (0..3)
+        .map(|a| {
+            (hi[a] + margin - (field.dims[a] as f64 - 1.0))
+                .ceil()
+                .max(0.0) as usize
+        })
+        .collect();
+    if before.iter().chain(&after).all(|n| *n == 0) {
+        return field.clone();
+    }
+    let dims = [0, 1, 2].map(|a| field.dims[a] + before[a] + after[a]);
+    let by = Vec3::new(before[0] as f64, before[1] as f64, before[2] as f64);
+    let outside = field.values.iter().copied().fold(0.0, f32::min);
+    let origin = field.origin - by * field.spacing;
+    let mut out = VoxelGrid::filled(origin, field.spacing, dims, outside);
+    for k in 0..field.dims[2] {
+        for j in 0..field.dims[1] {
+            let from = field.index(0, j, k);
+            let to = out.index(before[0], j + before[1], k + before[2]);
+            out.values[to..to + field.dims[0]]
+                .copy_from_slice(&field.values[from..from + field.dims[0]]);
+        }
+    }
+    out
+}
+
+/// Takes away the crumbs: all but the largest of the pieces that are smaller than a cube of edge `edge` mm.
+fn drop_crumbs(field: &mut VoxelGrid<f32>, edge: f64) {
+    let most = (edge / field.spacing).powi(3).min(1e7) as usize;
+    let set = VoxelSet::positive(field.dims, &field.values);
+    let pieces = set.components(true, most);
+    let largest = pieces.iter().map(|p| p.size).max().unwrap_or(0);
+    for piece in pieces.iter().filter(|p| p.size < largest) {
+        for &v in &piece.voxels {
+            field.values[v as usize] = -0.5 * field.spacing as f32;
+        }
+    }
+}
+
+/// Cleans the field and extracts its surface; `None` when nothing is left.
+fn solid_of(
+    mut field: VoxelGrid<f32>,
+    near: &Near,
+    island: f64,
+    noise: f64,
+    proposal: &Remeshed,
+    monitor: &Monitor,
+) -> Result<Option<Remeshed>, RemeshError> {
+    drop_crumbs(&mut field, island);
+    if !near
+        .refresh(&mut field, None, monitor)?
+        .solid
+        .contains(&true)
+    {
+        return Ok(None);
+    }
+    let cleaned = noise::remove_noise(&mut field, noise, None, &[], monitor)?;
+    let mut set = near.refresh(&mut field, Some(&cleaned.touched), monitor)?;
+    if !set.solid.contains(&true) {
+        return Ok(None);
+    }
+    compose::separate_opposite_empties(&mut field, &mut set);
+    let solid = Solid::try_from(extract::surface(&field, &set, true).mesh)?;
+    let after = set.betti();
+    if solid.euler() != 2 * after.chi {
+        return Err(RemeshError::Topology {
+            surface: solid.euler(),
+            voxels: after.chi,
+        });
+    }
+    Ok(Some(Remeshed {
+        solid,
+        field,
+        genus_before: proposal.genus_after,
+        genus_after: after.b1,
+        changes: cleaned.changes,
+        distance_max: proposal.distance_max,
+        source: proposal.source,
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EYES: [f64; 2] = [-30.0, 30.0];
+    const WALL: f64 = 8.0;
+    const BORE: f64 = 4.0;
+    const HEIGHT: f64 = 4.0;
+
+    /// Two eyes, whose walls stand out by `burr`, on a bar as high as `height` to each side.
+    fn proposal(burr: f64, height: f64) -> Remeshed {
+        let mut field = VoxelGrid::filled(Vec3::new(-45.0, -14.0, -10.0), 0.8, [114, 36, 26], 0f32);
+        for v in 0..field.values.len() {
+            let [i, j, k] = field.ijk(v);
+            let p = field.centre(i, j, k);
+            let eye = EYES.map(|x| {
+                let radial = (p - Vec3::new(x, 0.0, p.z)).norm();
+                (WALL + burr - radial)
+                    .min(radial - BORE)
+                    .min(HEIGHT - p.z.abs())
+            });
+            let bar = (26.0 - p.x.abs())
+                .min(3.0 - p.y.abs())
+                .min(height - p.z.abs());
+            let outside = EYES.map(|x| (p - Vec3::new(x, 0.0, p.z)).norm() - BORE);
+            let bar = bar.min(outside[0]).min(outside[1]);
+            field.values[v] = eye[0].max(eye[1]).max(bar) as f32;
+        }
+        let set = VoxelSet::positive(field.dims, &field.values);
+        let surface = extract::surface(&field, &set, true).mesh;
+        Remeshed {
+            solid: Solid::try_from(surface).expect("a solid"),
+            field,
+            genus_before: 2,
+            genus_after: 2,
+            changes: Vec::new(),
+            distance_max: 0.0,
+            source: None,
+        }
+    }
+
+    /// The eyes as bodies.
+    fn bosses() -> Bosses {
+        const N: u32 = 64;
+        let mut out = Bosses::default();
+        for (body, x) in EYES.into_iter().enumerate() {
+            let first = out.surface.points.len() as u32;
+            for z in [-HEIGHT, HEIGHT] {
+                out.surface.points.push(Vec3::new(x, 0.0, z));
+                for k in 0..N {
+                    let (s, c) = (std::f64::consts::TAU * f64::from(k) / f64::from(N)).sin_cos();
+                    out.surface
+                        .points
+                        .push(Vec3::new(x + WALL * c, WALL * s, z));
+                }
+            }
+            let (low, high) = (first, first + N + 1);
+            for k in 0..N {
+                let (a, b) = (1 + k, 1 + (k + 1) % N);
+                out.surface.triangles.extend([
+                    [low, low + b, low + a],
+                    [high, high + a, high + b],
+                    [low + a, low + b, high + b],
+                    [low + a, high + b, high + a],
+                ]);
+            }
+            out.surface
+                .tags
+                .resize(out.surface.triangles.len(), body as u32);
+            let (a, b) = (Vec3::new(x, 0.0, -9.0), Vec3::new(x, 0.0, 9.0));
+            out.free.push(Capsule { a, b, radius: BORE });
+        }
+        out
+    }
+
+    fn cut(proposal: &Remeshed) -> DesignPart {
+        cut_out(
+            proposal,
+            &bosses(),
+            &CutOutOptions::default(),
+            &Monitor::default(),
+        )
+        .expect("no error")
+        .expect("something left")
+    }
+
+    /// Extent of the material at `y = 0`, height `z`.
+    fn reach(field: &VoxelGrid<f32>, z: f64) -> f64 {
+        let inside = |x: &f64| field.sample(&Vec3::new(*x, 0.0, z)) > 0.0;
+        (0..450)
+            .map(|k| 0.1 * f64::from(k))
+            .filter(inside)
+            .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn eyes_go_and_the_bar_runs_on_into_their_walls() {
+        let design = cut(&proposal(0.0, 2.0));
+        assert_eq!((design.part.genus_after, design.part.solid.euler()), (0, 2));
+        assert_eq!((design.united.b0, design.united.b1), (1, 2));
+        assert_eq!(design.united, design.wanted);
+        // The walls begin at x = 22 and end at 26.
+        let end = reach(&design.part.field, 0.0);
+        assert!((22.8..24.0).contains(&end), "{end}");
+        // Half-way along the bar nothing has changed.
+        let middle = design.part.field.sample(&Vec3::new(3.0, 0.0, 1.7));
+        assert!((middle - 0.3).abs() < 0.05, "{middle}");
+    }
+
+    #[test]
+    fn walls_that_stand_out_leave_no_shells() {
+        let design = cut(&proposal(0.7, 2.0));
+        assert_eq!(design.united, design.wanted);
+        let highest = design.part.solid.mesh().points.iter().map(|p| p.y.abs());
+        assert!(highest.fold(0.0, f64::max) < 4.0);
+    }
+
+    #[test]
+    fn under_open_end_faces_the_bar_dives() {
+        let design = cut(&proposal(0.0, HEIGHT));
+        assert_eq!(design.united, design.wanted);
+        assert!(reach(&design.part.field, 2.5) > 22.5);
+        assert!(reach(&design.part.field, 3.5) < 22.4);
+    }
+
+    #[test]
+    fn without_bodies_there_is_nothing_to_cut_out() {
+        let (options, monitor) = (CutOutOptions::default(), Monitor::default());
+        let part = cut_out(&proposal(0.0, 2.0), &Bosses::default(), &options, &monitor);
+        assert!(part.expect("no error").is_none());
+    }
+}
