@@ -266,11 +266,6 @@ std::unique_ptr<Shape> read_iges(rust::Str path) {
 
 void write_iges(const Shape& s, rust::Str path, const StepNames& names) {
   IGESControl_Controller::Init();
-  const auto set = [](const char* key, const rust::String& value) { Interface_Static::SetCVal(key, std::string(value).c_str()); };
-  set("write.iges.header.product", names.product);
-  set("write.iges.header.author", names.author);
-  set("write.iges.header.company", names.organization);
-  set("write.iges.header.receiver", names.product);
   set_uncertainty(names.uncertainty);
   constexpr int solids = 1;  // manifold solids (entity 186), not loose trimmed surfaces
   IGESControl_Writer writer("MM", solids);
@@ -278,6 +273,12 @@ void write_iges(const Shape& s, rust::Str path, const StepNames& names) {
   writer.ComputeModel();
   IGESData_GlobalSection header = writer.Model()->GlobalSection();
   header.SetFileName(text(names.product));
+  header.SetSendName(text(names.product));
+  header.SetReceiveName(text(names.product));
+  // Without these the writer gives away the login name.
+  header.SetAuthorName(text(names.author));
+  header.SetCompanyName(text(names.organization));
+  header.SetSystemId(text(names.system));
   if (!names.time_stamp.empty()) {
     header.SetDate(text(names.time_stamp));
     header.SetLastChangeDate(text(names.time_stamp));
