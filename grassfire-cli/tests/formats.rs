@@ -57,7 +57,11 @@ fn ring(folder: &Path, low: f64, high: f64) -> PathBuf {
 #[cfg(feature = "occt")]
 fn seated(folder: &Path, args: &[&str]) -> Run {
     let seat = ring(folder, 0.0, THICK).display().to_string();
-    let all: Vec<&str> = ["--non-design", &seat].iter().chain(args).copied().collect();
+    let all: Vec<&str> = ["--non-design", &seat]
+        .iter()
+        .chain(args)
+        .copied()
+        .collect();
     run(folder, &all)
 }
 
@@ -73,7 +77,14 @@ fn listed(run: &Run) -> Vec<String> {
 #[test]
 fn all_formats_are_written_listed_and_taken_away_again() {
     let folder = tempfile::tempdir().expect("a folder");
-    let asked = ["--format", "brep,3mf", "--format", "iges", "--format", "pieces,step"];
+    let asked = [
+        "--format",
+        "brep,3mf",
+        "--format",
+        "iges",
+        "--format",
+        "pieces,step",
+    ];
     let first = seated(folder.path(), &asked);
     assert!(matches!(first.code, Some(0 | 1)), "{}", first.stderr);
     let extra = [
@@ -85,7 +96,10 @@ fn all_formats_are_written_listed_and_taken_away_again() {
     ];
     let names = listed(&first);
     for name in extra.iter().chain(&["part.step", "part.stl"]) {
-        assert!(names.iter().any(|n| n == name), "{name} is not in {names:?}");
+        assert!(
+            names.iter().any(|n| n == name),
+            "{name} is not in {names:?}"
+        );
         assert!(!first.file(name).is_empty());
     }
     let report = first.report();
@@ -147,7 +161,11 @@ fn unknown_formats_and_chords_are_refused_before_anything_is_written() {
         let run = run(folder.path(), &args);
         assert_eq!(run.code, Some(2), "{}", run.stderr);
         let errors = run.lines("error: ");
-        assert!(errors.len() == 1 && errors[0].contains(word), "{}", run.stderr);
+        assert!(
+            errors.len() == 1 && errors[0].contains(word),
+            "{}",
+            run.stderr
+        );
         assert_eq!(run.lines("hint: ").len(), 1, "{}", run.stderr);
         assert!(!run.output.exists(), "a refused run must write nothing");
     }
@@ -202,7 +220,10 @@ fn a_bore_changed_in_freecad_recomputes_the_part() {
         .iter()
         .filter_map(|f| f[1].as_str())
         .collect();
-    assert_eq!(labels, ["organic body", "seat", "seat: bore", "fuse", "part"]);
+    assert_eq!(
+        labels,
+        ["organic body", "seat", "seat: bore", "fuse", "part"]
+    );
 
     let tools = tools.display().to_string();
     let file = run.output.join("part.FCStd").display().to_string();

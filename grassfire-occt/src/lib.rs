@@ -21,8 +21,8 @@ use cxx::UniquePtr;
 use ffi::bridge;
 pub use ffi::bridge::Counts;
 pub use types::{
-    BooleanResult, BrepDescription, Edge, Face, Line, Operation, Origin, StepContents, StepTexts, Surface,
-    Triangulation,
+    BooleanResult, BrepDescription, Edge, Face, Line, Operation, Origin, StepContents, StepTexts,
+    Surface, Triangulation,
 };
 use types::{check_description, check_finite, edge, face, origin};
 

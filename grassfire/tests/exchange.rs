@@ -99,9 +99,12 @@ fn texts() -> StepOptions {
     }
 }
 
-/// How many faces have each name, and the colours that go with it.
-fn by_name(found: &StepContents) -> BTreeMap<&str, (usize, Vec<Option<[u8; 3]>>)> {
-    let mut out = BTreeMap::<_, (usize, Vec<_>)>::new();
+/// How many faces have a name, and the colours that go with it.
+type Painted = (usize, Vec<Option<[u8; 3]>>);
+
+/// The faces of each name.
+fn by_name(found: &StepContents) -> BTreeMap<&str, Painted> {
+    let mut out = BTreeMap::<&str, Painted>::new();
     for (name, color) in found.faces.iter().zip(&found.colors) {
         let entry = out.entry(name.as_str()).or_default();
         entry.0 += 1;
@@ -116,7 +119,11 @@ fn written(solid: &CadSolid) -> Result<(StepContents, String, tempfile::TempDir)
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("part.step");
     cad::write_step(solid, &path, &texts())?;
-    Ok((step_contents(&path)?, std::fs::read_to_string(&path)?, folder))
+    Ok((
+        step_contents(&path)?,
+        std::fs::read_to_string(&path)?,
+        folder,
+    ))
 }
 
 #[test]
@@ -127,10 +134,14 @@ fn step_names_every_face_by_its_body() -> Result {
     assert_eq!(found.products, ["bracket"]);
     assert_eq!(found.solids, ["bracket"]);
     let names = by_name(&found);
-    let count = |wanted: fn(&FaceSource) -> bool| solid.sources.iter().filter(|s| wanted(s)).count();
+    let count =
+        |wanted: fn(&FaceSource) -> bool| solid.sources.iter().filter(|s| wanted(s)).count();
     let of = |name: &str| names.get(name).map_or(0, |entry| entry.0);
     assert_eq!(of("organic"), count(|s| *s == FaceSource::Organic));
-    assert_eq!(of("eye: bore"), count(|s| matches!(s, FaceSource::Bore(..))));
+    assert_eq!(
+        of("eye: bore"),
+        count(|s| matches!(s, FaceSource::Bore(..)))
+    );
     assert_eq!(
         of("eye: wall") + of("eye: plane"),
         count(|s| matches!(s, FaceSource::Body(_)))
@@ -139,7 +150,11 @@ fn step_names_every_face_by_its_body() -> Result {
     assert_eq!(of("eye: plane"), 2);
     assert_eq!(found.faces.len(), solid.faces);
     let color = |name: &str| names[name].1.clone();
-    assert!(names.values().all(|(_, colors)| colors.len() == 1 && colors[0].is_some()));
+    assert!(
+        names
+            .values()
+            .all(|(_, colors)| colors.len() == 1 && colors[0].is_some())
+    );
     assert_eq!(color("eye: bore"), color("eye: wall"));
     assert_ne!(color("eye: bore"), color("organic"));
     for part in [
@@ -157,7 +172,10 @@ fn step_names_every_face_by_its_body() -> Result {
         .nth(1)
         .and_then(|rest| rest.split(')').next()?.parse::<f64>().ok())
         .ok_or("no uncertainty")?;
-    assert!((claimed / solid.max_tolerance - 1.0).abs() < 1e-6, "{claimed}");
+    assert!(
+        (claimed / solid.max_tolerance - 1.0).abs() < 1e-6,
+        "{claimed}"
+    );
     Ok(())
 }
 
@@ -171,7 +189,10 @@ fn separate_bodies_are_named_parts_of_an_assembly() -> Result {
     assert_eq!(products, ["bracket", "eye", "organic body"]);
     let names = by_name(&found);
     assert_eq!(names["organic"].0, 6);
-    assert!(names.contains_key("eye: bore") && names.contains_key("eye: wall"), "{names:?}");
+    assert!(
+        names.contains_key("eye: bore") && names.contains_key("eye: wall"),
+        "{names:?}"
+    );
     assert!(text.contains("NOT VALID"));
     let back = Shape::read_step(&folder.path().join("part.step"))?;
     assert_eq!(back.counts()?.solids, 2);
@@ -194,7 +215,10 @@ fn brep_and_iges_hold_the_part() -> Result {
     let iges = Shape::read_iges(&path("a.igs"))?;
     assert!((iges.volume(1e-8)? / solid.volume - 1.0).abs() < 1e-4);
     assert_eq!(
-        (iges.counts()?.solids as usize, iges.counts()?.faces as usize),
+        (
+            iges.counts()?.solids as usize,
+            iges.counts()?.faces as usize
+        ),
         (solid.bodies, solid.faces)
     );
     let text = std::fs::read_to_string(path("a.igs"))?;

@@ -51,7 +51,8 @@ pub use {
         read_design_space,
     },
     output::{
-        ORGANIC_PIECE, piece_name, tessellate, tessellate_solids, write_brep, write_iges, write_pieces, write_step,
+        ORGANIC_PIECE, piece_name, tessellate, tessellate_solids, write_brep, write_iges,
+        write_pieces, write_step,
     },
 };
 

@@ -63,7 +63,10 @@ fn face_name(solid: &CadSolid, face: &Face, source: FaceSource) -> String {
         FaceSource::Organic => return "organic".into(),
         FaceSource::Body(i) => (i, kind(&face.surface).to_owned()),
         FaceSource::Bore(i, k) => {
-            let bores = solid.non_design.get(i as usize).map_or(0, |b| b.bores.len());
+            let bores = solid
+                .non_design
+                .get(i as usize)
+                .map_or(0, |b| b.bores.len());
             let number = if bores > 1 {
                 format!("bore {}", k + 1)
             } else {

@@ -69,7 +69,10 @@ pub enum StageError {
     NoQuadSize,
     #[error("the format {format} cannot be written: this build has no OpenCASCADE")]
     Format { format: &'static str },
-    #[error("files.chord is {chord} mm; {} or more wanted", super::exchange::MIN_CHORD)]
+    #[error(
+        "files.chord is {chord} mm; {} or more wanted",
+        super::exchange::MIN_CHORD
+    )]
     Chord { chord: f64 },
     #[error("the triangles of {name} do not close: {source}")]
     Open { name: String, source: SolidError },

@@ -18,7 +18,9 @@ use crate::monitor::Monitor;
 use crate::report::RefusedFile;
 
 /// A file of the finished part.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Format {
     /// `part.step`, which is always written.
@@ -79,7 +81,9 @@ pub(super) fn check(options: &ReconstructOptions) -> Result<(), StageError> {
         });
     }
     match files.chord {
-        Some(chord) if !(chord.is_finite() && chord >= MIN_CHORD) => Err(StageError::Chord { chord }),
+        Some(chord) if !(chord.is_finite() && chord >= MIN_CHORD) => {
+            Err(StageError::Chord { chord })
+        }
         _ => Ok(()),
     }
 }

@@ -1,11 +1,11 @@
 //! The finished part: the CAD solid united with the non-design bodies or, without OpenCASCADE, the limit surface.
 
+use super::ReconstructOptions;
 use super::bodies::Bodies;
 use super::error::StageError;
 #[cfg(feature = "occt")]
 use super::exchange::Format;
 use super::shape::Surface;
-use super::ReconstructOptions;
 #[cfg(feature = "occt")]
 use crate::cad::{self, CadSolid, NonDesignResult};
 use crate::mesh::TriMesh;
