@@ -88,6 +88,15 @@ pub(super) fn check(options: &ReconstructOptions) -> Result<(), StageError> {
     }
 }
 
+/// The triangles of a part of one solid, with its name.
+fn named(triangles: &TriMesh, texts: &StepOptions) -> (String, TriMesh) {
+    let mesh = TriMesh {
+        tags: Vec::new(),
+        ..triangles.clone()
+    };
+    (texts.product().to_owned(), mesh)
+}
+
 /// What the files of a run are made from.
 pub(super) struct Files<'a> {
     pub(super) job: &'a ReconstructJob,
@@ -108,16 +117,24 @@ impl Files<'_> {
         let texts = self.texts();
         #[cfg(feature = "occt")]
         cad::write_step(&self.part.solid, &self.delivery.path("part.step"), &texts)?;
-        let finer = self.finer()?;
+        let mut refused = Vec::new();
+        let finer = self.finer().unwrap_or_else(|error| {
+            let reason = format!("it has the usual triangles, not those of files.chord: {error}");
+            monitor.warn("write", format!("part.stl: {reason}"));
+            refused.push(RefusedFile {
+                path: "part.stl".to_owned(),
+                reason,
+            });
+            None
+        });
         let triangles = finer.as_ref().unwrap_or(&self.part.mesh);
         self.delivery.stl("part.stl", triangles)?;
         let mut formats = self.job.options.files.formats.clone();
         formats.sort_unstable();
         formats.dedup();
-        let mut refused = Vec::new();
         for format in formats {
             monitor.check()?;
-            let (name, result) = self.one(format, &texts);
+            let (name, result) = self.one(format, triangles, &texts);
             if let Err(error) = result {
                 let reason = error.to_string();
                 monitor.warn("write", format!("{name} is left out: {reason}"));
@@ -140,10 +157,15 @@ impl Files<'_> {
         texts
     }
 
-    fn one(&self, format: Format, texts: &StepOptions) -> (&'static str, Result<(), StageError>) {
+    fn one(
+        &self,
+        format: Format,
+        triangles: &TriMesh,
+        texts: &StepOptions,
+    ) -> (&'static str, Result<(), StageError>) {
         match format {
             Format::Step => ("part.step", Ok(())),
-            Format::ThreeMf => ("part.3mf", self.three_mf(texts)),
+            Format::ThreeMf => ("part.3mf", self.three_mf(triangles, texts)),
             #[cfg(feature = "occt")]
             Format::Brep => ("part.brep", self.brep()),
             #[cfg(feature = "occt")]
@@ -161,9 +183,9 @@ impl Files<'_> {
     }
 
     /// Only what is closed is written: slicers guess the inside of anything else.
-    fn three_mf(&self, texts: &StepOptions) -> Result<(), StageError> {
+    fn three_mf(&self, triangles: &TriMesh, texts: &StepOptions) -> Result<(), StageError> {
         let mut objects = Vec::new();
-        for (name, mesh) in self.solids(texts)? {
+        for (name, mesh) in self.solids(triangles, texts)? {
             let solid = Solid::try_from(mesh).map_err(|source| StageError::Open {
                 name: name.clone(),
                 source,
@@ -185,11 +207,6 @@ impl Files<'_> {
 
 #[cfg(feature = "occt")]
 impl Files<'_> {
-    fn chord(&self) -> f64 {
-        let usual = super::union::CHORD * self.voxel;
-        self.job.options.files.chord.unwrap_or(usual)
-    }
-
     /// Triangles with the chord that was asked for.
     fn finer(&self) -> Result<Option<TriMesh>, StageError> {
         let asked = self.job.options.files.chord;
@@ -197,12 +214,17 @@ impl Files<'_> {
         Ok(mesh.transpose()?)
     }
 
-    fn solids(&self, texts: &StepOptions) -> Result<Vec<(String, TriMesh)>, StageError> {
-        Ok(cad::tessellate_solids(
-            &self.part.solid,
-            self.chord(),
-            texts,
-        )?)
+    fn solids(
+        &self,
+        triangles: &TriMesh,
+        texts: &StepOptions,
+    ) -> Result<Vec<(String, TriMesh)>, StageError> {
+        if self.part.solid.bodies == 1 {
+            return Ok(vec![named(triangles, texts)]);
+        }
+        let usual = super::union::CHORD * self.voxel;
+        let chord = self.job.options.files.chord.unwrap_or(usual);
+        Ok(cad::tessellate_solids(&self.part.solid, chord, texts)?)
     }
 
     fn brep(&self) -> Result<(), StageError> {
@@ -228,7 +250,11 @@ impl Files<'_> {
         Ok(None)
     }
 
-    fn solids(&self, texts: &StepOptions) -> Result<Vec<(String, TriMesh)>, StageError> {
-        Ok(vec![(texts.product().to_owned(), self.part.mesh.clone())])
+    fn solids(
+        &self,
+        triangles: &TriMesh,
+        texts: &StepOptions,
+    ) -> Result<Vec<(String, TriMesh)>, StageError> {
+        Ok(vec![named(triangles, texts)])
     }
 }

@@ -98,7 +98,8 @@ fn good_report_meets_all_checks() {
 #[test]
 fn each_defect_misses_its_check() {
     type Damage = fn(&mut Report);
-    let cases: [(&str, Damage); 9] = [
+    let cases: [(&str, Damage); 10] = [
+        ("files", |r| r.refused.push(RefusedFile::default())),
         ("topology.skeleton", |r| {
             r.topology.iter_mut().for_each(|t| t.skeleton.b1 += 1)
         }),
