@@ -16,6 +16,7 @@ fn main() {
         "cpp/boolean.cpp",
         "cpp/query.cpp",
         "cpp/exchange.cpp",
+        "cpp/tessellate.cpp",
     ] {
         println!("cargo:rerun-if-changed={file}");
     }
@@ -28,6 +29,7 @@ fn main() {
             "cpp/boolean.cpp",
             "cpp/query.cpp",
             "cpp/exchange.cpp",
+            "cpp/tessellate.cpp",
         ])
         // Not our headers: no warnings about them.
         .flag(format!("-isystem{}", include.display()))
@@ -39,11 +41,13 @@ fn main() {
         println!("cargo:rustc-link-search=native={}", library.display());
         println!("cargo:rustc-link-arg=-Wl,-rpath,{}", library.display());
     }
-    // The STEP toolkits were renamed in 7.8.
-    let step: &[&str] = if (major, minor) >= (7, 8) {
-        &["TKDESTEP", "TKDE", "TKXSBase"]
+    // The toolkits for files were renamed in 7.8.
+    let exchange: &[&str] = if (major, minor) >= (7, 8) {
+        &["TKDEIGES", "TKDESTEP", "TKDE", "TKXSBase"]
     } else {
         &[
+            "TKIGES",
+            "TKXDESTEP",
             "TKSTEP",
             "TKSTEPAttr",
             "TKSTEP209",
@@ -52,6 +56,9 @@ fn main() {
         ]
     };
     let modelling = [
+        "TKXCAF",
+        "TKLCAF",
+        "TKCDF",
         "TKBO",
         "TKBool",
         "TKPrim",
@@ -66,7 +73,7 @@ fn main() {
         "TKMath",
         "TKernel",
     ];
-    for name in step.iter().chain(&modelling) {
+    for name in exchange.iter().chain(&modelling) {
         println!("cargo:rustc-link-lib=dylib={name}");
     }
 }

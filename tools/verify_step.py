@@ -4,8 +4,8 @@
     verify_step.py FOLDER|PART.step [...] [--volume MM3] [--genus N] [--solids N] [--mesh H] [--json]
 
 A FOLDER is the output of a run: its part.step is compared with its report.json. Prints one line a file, or one JSON
-object a line; exit code 1 when a check fails: valid, closed, both readers agree, and volume (1e-4), genus and number of
-solids as in the report or as given. `--mesh H` also makes a tetrahedral mesh of size H with gmsh.
+object a line; exit code 1 when a check fails: valid, closed, both readers agree, and volume (1e-4), genus, number of
+solids and names of faces as in the report or as given. `--mesh H` also makes a tetrahedral mesh of size H with gmsh.
 
 Needs gmsh and cadquery-ocp (7.7 or newer, 8 too).
 """
@@ -57,6 +57,19 @@ def edge_uses(shape):
     return [entry for group in uses.values() for entry in group if not BRep_Tool.Degenerated_s(to_edge(entry[0]))]
 
 
+def face_names(reader, shape):
+    """How many faces have each name; faces without one count under the empty name."""
+    from OCP.TopAbs import TopAbs_FACE
+
+    transfer = reader.WS().TransferReader()
+    names = {}
+    for face, _ in distinct(TopAbs_FACE, shape):
+        item = transfer.EntityFromShapeResult(face, 1)
+        name = item.Name().ToCString() if hasattr(item, "Name") else ""
+        names[name] = names.get(name, 0) + 1
+    return names
+
+
 def read_ocp(path):
     """Validity, counts, volume and genus (V - E + F - inner wires = 2 shells - 2 genus)."""
     from OCP.BRepCheck import BRepCheck_Analyzer
@@ -88,6 +101,7 @@ def read_ocp(path):
         "genus": shells - euler // 2,
         "volume": properties.Mass(),
         "default_rule_volume": default.Mass(),
+        "names": face_names(reader, shape),
     }
 
 
@@ -129,13 +143,17 @@ def read_gmsh(path, size):
 
 def expected(path, args):
     """The STEP file, and what it must hold."""
-    want = {"volume": args.volume, "genus": args.genus, "solids": args.solids, "valid": True}
+    want = {"volume": args.volume, "genus": args.genus, "solids": args.solids, "valid": True, "names": {}}
     if not path.is_dir():
         return path, want
-    solid = json.loads((path / "report.json").read_text())["solid"]
+    report = json.loads((path / "report.json").read_text())
+    solid = report["solid"]
+    # Bodies side by side have faces of their own, which the report does not count.
+    names = {b["name"]: b["faces"] for b in report.get("non_design", []) if b["kept"]}
+    names["organic"] = solid["faces"] - sum(names.values()) if solid["valid"] else None
     # A solid may be called invalid for reasons that BRepCheck does not see (a body not kept), never the other way.
-    report = {"volume": solid["volume"], "genus": solid["genus"], "solids": solid["bodies"], "valid": solid["valid"]}
-    return path / "part.step", report
+    want = {"volume": solid["volume"], "genus": solid["genus"], "solids": solid["bodies"], "valid": solid["valid"]}
+    return path / "part.step", want | {"names": names}
 
 
 def faults(ocp, gm, want):
@@ -154,6 +172,10 @@ def faults(ocp, gm, want):
             out.append(f"{name} {ocp[name]} instead of {want[name]}")
     if want["volume"] is not None and abs(ocp["volume"] - want["volume"]) > VOLUME_LIMIT * abs(want["volume"]):
         out.append(f"volume {ocp['volume']:.3f} instead of {want['volume']:.3f} mm3")
+    for name, count in want["names"].items():
+        have = sum(n for face, n in ocp["names"].items() if face == name or face.startswith(name + ": "))
+        if count is not None and have != count:
+            out.append(f"{have} faces are named after {name} instead of {count}")
     if "mesh_error" in gm:
         out.append(f"gmsh cannot mesh it: {gm['mesh_error']}")
     return out

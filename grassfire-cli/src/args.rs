@@ -78,6 +78,9 @@ pub struct ReconstructArgs {
     /// Density at which material begins (read.threshold)
     #[arg(long, value_name = "VALUE", value_parser = finite, allow_negative_numbers = true)]
     pub iso: Option<f64>,
+    /// Files to write besides part.step and part.stl; may be repeated or a comma list (files.formats)
+    #[arg(long, value_enum, value_name = "FORMAT", value_delimiter = ',')]
+    pub format: Vec<FileFormat>,
     /// Refuse a mesh that needs repair (repair.strict)
     #[arg(long)]
     pub strict: bool,
@@ -98,6 +101,22 @@ pub enum Recognise {
     List,
     /// List them; without --non-design, unite them with the part
     Auto,
+}
+
+/// A file of the finished part.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum FileFormat {
+    /// part.step: AP242 with names and colours, always written
+    Step,
+    /// part.brep: OpenCASCADE's own format
+    Brep,
+    /// part.igs: IGES 5.3
+    Iges,
+    /// part.3mf: closed triangles with unit and names
+    #[value(name = "3mf")]
+    ThreeMf,
+    /// pieces/: the fitted body and each non-design body as STEP, for tools/freecad_tree.py
+    Pieces,
 }
 
 /// Arguments of `demo`.

@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use grassfire::io::atomic_write;
 use grassfire::monitor::Monitor;
-use grassfire::pipeline::{Outcome, ReconstructJob, ReconstructOptions, reconstruct};
+use grassfire::pipeline::{Format, Outcome, ReconstructJob, ReconstructOptions, reconstruct};
 use grassfire::report;
 
-use crate::args::{DemoArgs, Example, Recognise, ReconstructArgs, RunArgs};
+use crate::args::{DemoArgs, Example, FileFormat, Recognise, ReconstructArgs, RunArgs};
 use crate::failure::{Failure, chain};
 use crate::progress::{Bar, Shared, Talk};
 use crate::{settings, summary};
@@ -33,6 +33,9 @@ pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
         };
         ("non_design.recognise", mode.to_owned())
     }));
+    if !args.format.is_empty() {
+        short.push(("files.formats", formats(&args.format)));
+    }
     let job = ReconstructJob {
         part: args.part.clone(),
         non_design: args.non_design.clone(),
@@ -43,6 +46,22 @@ pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
         options: options(&short, &args.run)?,
     };
     run(&job, &args.run)
+}
+
+/// The list of formats as a setting.
+fn formats(asked: &[FileFormat]) -> String {
+    let name = |format: &FileFormat| {
+        let format = match format {
+            FileFormat::Step => Format::Step,
+            FileFormat::Brep => Format::Brep,
+            FileFormat::Iges => Format::Iges,
+            FileFormat::ThreeMf => Format::ThreeMf,
+            FileFormat::Pieces => Format::Pieces,
+        };
+        format!("{:?}", format.name())
+    };
+    let names: Vec<String> = asked.iter().map(name).collect();
+    format!("[{}]", names.join(","))
 }
 
 /// `grassfire demo`: the example's files are part of the program and are written next to the results.

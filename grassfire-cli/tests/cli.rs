@@ -95,6 +95,9 @@ fn reconstruct_help_is_complete() {
           --voxel <MM>           Edge of a voxel, mm (remesh.voxel)
           --quad-size <MM>       Edge of a skeleton quad, mm (skeleton.quad_size)
           --iso <VALUE>          Density at which material begins (read.threshold)
+          --format <FORMAT>      Files to write besides part.step and part.stl; may be repeated or a
+                                 comma list (files.formats) [possible values: step, brep, iges, 3mf,
+                                 pieces]
           --strict               Refuse a mesh that needs repair (repair.strict)
       -o, --output <DIR>         Folder for the results; made when missing
           --set <KEY=VALUE>      Sets any option, such as remesh.min_tunnel=0; may be repeated

@@ -40,6 +40,7 @@ struct EdgeInfo;
 struct Triangulation;
 struct LineHit;
 struct StepNames;
+struct StepContents;
 struct BrepData;
 struct Interrupt;
 
@@ -96,6 +97,13 @@ rust::Vec<double> face_samples(const Shape& shape, rust::Slice<const uint32_t> f
 // exchange.cpp
 std::unique_ptr<Shape> read_step(rust::Str path);
 void write_step(const Shape& shape, rust::Str path, const StepNames& names);
+StepContents step_contents(rust::Str path);
+std::unique_ptr<Shape> read_brep(rust::Str path);
+void write_brep(const Shape& shape, rust::Str path);
+std::unique_ptr<Shape> read_iges(rust::Str path);
+void write_iges(const Shape& shape, rust::Str path, const StepNames& names);
+
+// tessellate.cpp
 Triangulation tessellate(const Shape& shape, double chord, double angle, rust::Slice<const uint32_t> fine, double fine_chord, double fine_angle);
 
 }  // namespace grassfire

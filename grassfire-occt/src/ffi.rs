@@ -68,8 +68,17 @@ pub(crate) mod bridge {
         system: String,
         description: String,
         time_stamp: String,
+        uncertainty: f64,
         solids: Vec<String>,
         faces: Vec<String>,
+        colors: Vec<u32>,
+    }
+
+    struct StepContents {
+        products: Vec<String>,
+        solids: Vec<String>,
+        faces: Vec<String>,
+        colors: Vec<i64>,
     }
 
     /// Flat arrays of a boundary representation; see [`crate::BrepDescription`].
@@ -151,6 +160,11 @@ pub(crate) mod bridge {
 
         fn read_step(path: &str) -> Result<UniquePtr<Shape>>;
         fn write_step(shape: &Shape, path: &str, names: &StepNames) -> Result<()>;
+        fn step_contents(path: &str) -> Result<StepContents>;
+        fn read_brep(path: &str) -> Result<UniquePtr<Shape>>;
+        fn write_brep(shape: &Shape, path: &str) -> Result<()>;
+        fn read_iges(path: &str) -> Result<UniquePtr<Shape>>;
+        fn write_iges(shape: &Shape, path: &str, names: &StepNames) -> Result<()>;
         fn tessellate(
             shape: &Shape,
             chord: f64,

@@ -21,8 +21,8 @@ use cxx::UniquePtr;
 use ffi::bridge;
 pub use ffi::bridge::Counts;
 pub use types::{
-    BooleanResult, BrepDescription, Edge, Face, Line, Operation, Origin, StepTexts, Surface,
-    Triangulation,
+    BooleanResult, BrepDescription, Edge, Face, Line, Operation, Origin, StepContents, StepTexts,
+    Surface, Triangulation,
 };
 use types::{check_description, check_finite, edge, face, origin};
 
@@ -178,21 +178,49 @@ impl Shape {
         Self::make(|| bridge::read_step(text))
     }
 
-    /// Writes STEP AP242 in mm. Equal shapes and texts give equal files but for the time stamp.
+    /// Writes STEP AP242 in mm with product structure, names and colours. Equal shapes and texts give equal files but for
+    /// the time stamp.
     pub fn write_step(&self, path: &Path, texts: &StepTexts) -> Result<()> {
-        let text = path_text(path)?;
-        let names = bridge::StepNames {
-            product: texts.product.clone(),
-            author: texts.author.clone(),
-            organization: texts.organization.clone(),
-            system: texts.system.clone(),
-            description: texts.description.clone(),
-            time_stamp: texts.time_stamp.clone(),
-            solids: texts.solids.clone(),
-            faces: texts.faces.clone(),
-        };
+        let names = texts.bridge(self.max_tolerance()?, step_text::line);
+        let name = path_text(path)?;
+        {
+            let _guard = lock();
+            bridge::write_step(&self.0, name, &names)?;
+        }
+        let failed = |e: std::io::Error| OcctError(e.to_string());
+        let text = std::fs::read(path).map_err(failed)?;
+        if text.is_ascii() {
+            return Ok(());
+        }
+        let text = String::from_utf8_lossy(&text);
+        std::fs::write(path, step_text::encode(&text)).map_err(failed)
+    }
+
+    /// Writes OpenCASCADE's own format, without names.
+    pub fn write_brep(&self, path: &Path) -> Result<()> {
+        let path = path_text(path)?;
         let _guard = lock();
-        Ok(bridge::write_step(&self.0, text, &names)?)
+        Ok(bridge::write_brep(&self.0, path)?)
+    }
+
+    /// Reads OpenCASCADE's own format.
+    pub fn read_brep(path: &Path) -> Result<Self> {
+        let path = path_text(path)?;
+        Self::make(|| bridge::read_brep(path))
+    }
+
+    /// Writes IGES 5.3 in mm: manifold solids, without names of faces.
+    pub fn write_iges(&self, path: &Path, texts: &StepTexts) -> Result<()> {
+        let names = texts.bridge(self.max_tolerance()?, step_text::ascii);
+        let path = path_text(path)?;
+        let _guard = lock();
+        Ok(bridge::write_iges(&self.0, path, &names)?)
+    }
+
+    /// Reads an IGES file; units become mm.
+    pub fn read_iges(path: &Path) -> Result<Self> {
+        let path = path_text(path)?;
+        Self::make(|| bridge::read_iges(path))
     }
 
     /// Another handle on the same geometry.
@@ -410,6 +438,15 @@ impl Shape {
             faces: flat.faces,
         })
     }
+}
+
+/// Names and colours of the products, solids and faces of a STEP file.
+pub fn step_contents(path: &Path) -> Result<StepContents> {
+    let text = path_text(path)?;
+    let bytes = std::fs::read(path).map_err(|e| OcctError(e.to_string()))?;
+    step_text::check(&bytes).map_err(OcctError)?;
+    let _guard = lock();
+    Ok(types::contents(bridge::step_contents(text)?))
 }
 
 fn path_text(path: &Path) -> Result<&str> {

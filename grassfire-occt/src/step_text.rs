@@ -1,4 +1,5 @@
-//! A look at a STEP file's text before OpenCASCADE sees it: its reader crashes on references that lead nowhere.
+//! Text of STEP files: a look at it before OpenCASCADE sees it, whose reader crashes on references that lead nowhere, and
+//! the alphabet of names.
 
 use std::collections::HashSet;
 
@@ -63,9 +64,55 @@ fn end_of_comment(bytes: &[u8], at: usize) -> Result<usize, String> {
         .ok_or_else(|| format!("byte {at}: the comment has no end"))
 }
 
+/// A file in the alphabet of STEP (ISO 10303-21, 6.4.3): other characters as `\X2\` and their UTF-16 codes. The kernel
+/// writes them as they are.
+pub(crate) fn encode(text: &str) -> String {
+    let mut out = String::with_capacity(text.len() + 64);
+    let mut units = [0; 2];
+    let mut foreign = false;
+    for c in text.chars() {
+        if foreign == c.is_ascii() {
+            out += if foreign { "\\X0\\" } else { "\\X2\\" };
+            foreign = !foreign;
+        }
+        if !foreign {
+            out.push(c);
+            continue;
+        }
+        for unit in c.encode_utf16(&mut units) {
+            out += &format!("{unit:04X}");
+        }
+    }
+    out
+}
+
+/// A name on one line.
+pub(crate) fn line(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control()).collect()
+}
+
+/// A name in plain ASCII, for IGES.
+pub(crate) fn ascii(text: &str) -> String {
+    text.chars()
+        .filter(|c| !c.is_control())
+        .map(|c| if c.is_ascii() { c } else { '?' })
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
-    use super::check;
+    use super::{ascii, check, encode, line};
+
+    #[test]
+    fn names_in_the_alphabet_of_step() {
+        assert_eq!(encode("'boss 3: bore';\n"), "'boss 3: bore';\n");
+        assert_eq!(
+            encode("'J\u{f6}rg \u{3a9}\u{1f600}';"),
+            "'J\\X2\\00F6\\X0\\rg \\X2\\03A9D83DDE00\\X0\\';"
+        );
+        assert_eq!(line("a\r\nb"), "ab");
+        assert_eq!(ascii("J\u{f6}rg\t"), "J?rg");
+    }
 
     #[test]
     fn frame_and_references() {

@@ -136,3 +136,95 @@ fn bad_input_is_an_error() {
     };
     assert!(Shape::from_brep(&broken).is_err());
 }
+
+/// A plate with a bore, its faces named and painted, and a second body.
+fn named(shape: &Shape) -> Result<StepTexts> {
+    let bore = |f: &Face| matches!(f.surface, Surface::Cylinder { .. });
+    let faces = shape.faces()?;
+    let name = |f: &Face| if bore(f) { "eye: bore" } else { "organic" };
+    let color = |f: &Face| {
+        if bore(f) {
+            [242, 142, 43]
+        } else {
+            [160, 170, 180]
+        }
+    };
+    Ok(StepTexts {
+        product: "Tr\u{e4}ger \\ it's".into(),
+        author: "Jos\u{e9} \u{3a9}".into(),
+        time_stamp: "2026-01-01T00:00:00".into(),
+        solids: vec!["left".into(), "right".into()],
+        faces: faces.iter().map(|f| name(f).to_owned()).collect(),
+        colors: faces.iter().map(color).collect(),
+        ..StepTexts::default()
+    })
+}
+
+fn bored() -> Result<Shape> {
+    let cube = Shape::cuboid([0.0; 3], [4.0; 3])?;
+    let bore = Shape::cylinder([2.0, 2.0, -1.0], [0.0, 0.0, 1.0], 1.0, 6.0)?;
+    Ok(cube
+        .boolean(Operation::Cut, &bore, 1e-5, false, &never)?
+        .shape
+        .solids()?
+        .swap_remove(0))
+}
+
+#[test]
+fn step_gives_names_and_colours_back() -> std::result::Result<(), Box<dyn std::error::Error>> {
+    let path = std::env::temp_dir().join(format!("grassfire-names-{}.step", std::process::id()));
+    let one = bored()?;
+    let texts = named(&one)?;
+    one.write_step(&path, &texts)?;
+    let found = step_contents(&path)?;
+    let text = std::fs::read_to_string(&path)?;
+    assert!(text.is_ascii() && text.contains("AP242"), "{text}");
+    assert_eq!(
+        (found.products.as_slice(), found.solids.len()),
+        (std::slice::from_ref(&texts.product), 1)
+    );
+    let sorted = |mut pairs: Vec<(String, Option<[u8; 3]>)>| {
+        pairs.sort();
+        pairs
+    };
+    let wanted = |texts: &StepTexts| {
+        let colors = texts.colors.iter().map(|c| Some(*c));
+        sorted(texts.faces.iter().cloned().zip(colors).collect())
+    };
+    let have = |found: &StepContents| {
+        let pairs = found.faces.iter().cloned().zip(found.colors.clone());
+        sorted(pairs.collect())
+    };
+    assert_eq!(have(&found), wanted(&texts));
+
+    let two = Shape::compound([&one, &one.translated([9.0, 0.0, 0.0])?])?;
+    let texts = named(&two)?;
+    two.write_step(&path, &texts)?;
+    let found = step_contents(&path)?;
+    std::fs::remove_file(&path)?;
+    assert_eq!(found.products.len(), 3);
+    for name in [texts.product.as_str(), "left", "right"] {
+        assert!(found.products.iter().any(|p| p == name), "{found:?}");
+    }
+    assert_eq!(have(&found), wanted(&texts));
+    Ok(())
+}
+
+#[test]
+fn brep_and_iges_come_back() -> std::result::Result<(), Box<dyn std::error::Error>> {
+    let shape = bored()?;
+    let volume = shape.volume(1e-9)?;
+    let path = std::env::temp_dir().join(format!("grassfire-files-{}", std::process::id()));
+    let (brep, iges) = (path.with_extension("brep"), path.with_extension("igs"));
+    shape.write_brep(&brep)?;
+    shape.write_iges(&iges, &named(&shape)?)?;
+    let (a, b) = (Shape::read_brep(&brep)?, Shape::read_iges(&iges)?);
+    for file in [brep, iges] {
+        std::fs::remove_file(file)?;
+    }
+    assert!((a.volume(1e-9)? / volume - 1.0).abs() < 1e-12);
+    assert!((b.volume(1e-9)? / volume - 1.0).abs() < 1e-9);
+    assert_eq!((a.counts()?.solids, b.counts()?.solids), (1, 1));
+    assert!(Shape::read_brep(&path).is_err() && Shape::read_iges(&path).is_err());
+    Ok(())
+}

@@ -149,8 +149,8 @@ pub struct Triangulation {
     pub faces: Vec<u32>,
 }
 
-/// Texts of a STEP file.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+/// Texts and colours of a file.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepTexts {
     /// Product name, also the file name field of the header.
     pub product: String,
@@ -164,10 +164,68 @@ pub struct StepTexts {
     pub description: String,
     /// Time stamp (ISO 8601); empty: now.
     pub time_stamp: String,
-    /// Names of the solids, in the order of [`Shape::solids`]; may be shorter.
+    /// Accuracy that the file claims, mm; 0: the shape's largest tolerance.
+    pub uncertainty: f64,
+    /// Names of the solids, in the order of [`Shape::solids`]; may be shorter. Several solids become an assembly of parts
+    /// with these names.
     pub solids: Vec<String>,
     /// Names of the faces, in the order of [`Shape::faces`]; may be shorter, empty ones are skipped.
     pub faces: Vec<String>,
+    /// Colours of the faces (red, green, blue); none at all unless there is one for every face.
+    pub colors: Vec<[u8; 3]>,
+}
+
+/// Names and colours in a STEP file.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct StepContents {
+    /// Names of the products: the assembly, if there is one, and the parts.
+    pub products: Vec<String>,
+    /// Names of the solids.
+    pub solids: Vec<String>,
+    /// Names of the faces, solid by solid; empty where a face has none.
+    pub faces: Vec<String>,
+    /// Colour of each face, its own or that of its solid.
+    pub colors: Vec<Option<[u8; 3]>>,
+}
+
+impl StepTexts {
+    /// As the C++ side takes them, every text after `encode`.
+    pub(crate) fn bridge(&self, tolerance: f64, encode: fn(&str) -> String) -> bridge::StepNames {
+        let all = |texts: &[String]| texts.iter().map(|t| encode(t)).collect();
+        bridge::StepNames {
+            product: encode(&self.product),
+            author: encode(&self.author),
+            organization: encode(&self.organization),
+            system: encode(&self.system),
+            description: encode(&self.description),
+            time_stamp: encode(&self.time_stamp),
+            uncertainty: if self.uncertainty > 0.0 {
+                self.uncertainty
+            } else {
+                tolerance
+            },
+            solids: all(&self.solids),
+            faces: all(&self.faces),
+            colors: self
+                .colors
+                .iter()
+                .map(|&[r, g, b]| u32::from_be_bytes([0, r, g, b]))
+                .collect(),
+        }
+    }
+}
+
+pub(crate) fn contents(found: bridge::StepContents) -> StepContents {
+    let rgb = |code: &i64| {
+        let [_, r, g, b] = u32::try_from(*code).ok()?.to_be_bytes();
+        Some([r, g, b])
+    };
+    StepContents {
+        products: found.products,
+        solids: found.solids,
+        faces: found.faces,
+        colors: found.colors.iter().map(rgb).collect(),
+    }
 }
 
 pub(crate) fn origin(code: i32) -> Origin {

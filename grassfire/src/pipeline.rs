@@ -6,6 +6,7 @@ mod bodies;
 mod construct;
 mod deliver;
 mod error;
+mod exchange;
 mod illustrate;
 mod inputs;
 mod measure;
@@ -14,15 +15,16 @@ mod record;
 mod shape;
 mod union;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use error::{PipelineError, StageError};
+pub use exchange::{FileOptions, Format};
 pub use shape::RetryOptions;
 
-use crate::cad::{CadOptions, NonDesignOptions};
+use crate::cad::{CadOptions, NonDesignOptions, StepOptions};
 use crate::fit::FitOptions;
 use crate::io::ReadOptions;
 use crate::medial::{self, MedialOptions, PoleOptions};
@@ -79,6 +81,10 @@ pub struct ReconstructOptions {
     pub tessellate: TessellateOptions,
     /// CAD solid and its union with the non-design bodies.
     pub cad: CadOptions,
+    /// Which files are written of the part.
+    pub files: FileOptions,
+    /// Texts in the STEP, IGES and 3MF files.
+    pub step: StepOptions,
     /// Report and pictures.
     pub report: ReportOptions,
 }
@@ -133,6 +139,10 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
     let options = &job.options;
     let mut record = Record::start(&job.command);
 
+    exchange::check(options).map_err(|source| PipelineError {
+        stage: "options",
+        source,
+    })?;
     let mut bodies = record.stage("non_design", || bodies::read(job, monitor))?;
     let proposal = record.stage("read", || inputs::proposal(job, monitor))?;
     record.stage("read", || bodies.check_unit(proposal.bounds()))?;
@@ -156,7 +166,7 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         medial::poles(&remeshed.solid, &options.poles, monitor)
     })?;
     record.stage("write", || delivery.poles(&poles, &remeshed.solid))?;
-    let site = Site {
+    let mut site = Site {
         record: &mut record,
         remeshed: &remeshed,
         bodies: &mut bodies,
@@ -165,14 +175,23 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         options,
         monitor,
     };
-    let Made { axis, shape, part } = { site }.build()?;
+    let Made { axis, shape, part } = site.build()?;
     if part.non_design.is_empty() {
         recognise::left_out(&mut record.report.candidates);
     }
     record.report.solid = part.block.clone();
     record.report.non_design = part.non_design.clone();
-    record.stage("write", || {
-        union::deliver(&part, &product_name(&job.part), &delivery)
+    record.report.refused = record.stage("write", || {
+        let files = exchange::Files {
+            job,
+            part: &part,
+            #[cfg(feature = "occt")]
+            bodies: &bodies,
+            #[cfg(feature = "occt")]
+            voxel: remeshed.field.spacing,
+            delivery: &delivery,
+        };
+        files.write(monitor)
     })?;
 
     let deviation = record.stage("measure", || {
@@ -203,12 +222,4 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         report: record.report,
         failed_checks,
     })
-}
-
-/// Name of the product in the STEP file: the proposal's file name.
-fn product_name(part: &Path) -> String {
-    part.file_stem().map_or_else(
-        || "part".to_owned(),
-        |stem| stem.to_string_lossy().into_owned(),
-    )
 }

@@ -170,7 +170,7 @@ fn step_is_complete_and_repeatable() -> Result {
         text == std::fs::read_to_string(&two)?,
         "two files of one part differ"
     );
-    assert!(text.contains("AP242") && text.contains("'bracket'") && text.contains("'eye bore 1'"));
+    assert!(text.contains("AP242") && text.contains("'bracket'") && text.contains("'eye: bore'"));
     let back = read(&one, &NonDesignOptions::default(), &Monitor::default())?;
     assert_eq!(back.len(), 1);
     assert!((back[0].volume - solid.volume).abs() < 1e-6 * solid.volume);

@@ -1,13 +1,14 @@
 //! Bores of a non-design body: full concave cylinders, how far they are open, and the tools that cut them again.
 
 use grassfire_occt::{Face, Line, OcctError, Shape, Surface};
+use serde::Serialize;
 
 use super::array;
 use super::primitives::across;
 use crate::Vec3;
 
 /// A cylindrical hole.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bore {
     /// Point of the axis, mm.
     pub origin: Vec3,

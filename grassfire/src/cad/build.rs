@@ -30,6 +30,8 @@ pub struct CadSolid {
     pub shape: Shape,
     /// All checks passed. When false, `messages` tell why, and the shape may be the bodies side by side.
     pub valid: bool,
+    /// The fitted body as it was united.
+    pub organic: Shape,
     /// Number of solids.
     pub bodies: usize,
     /// Number of faces.
@@ -87,6 +89,7 @@ pub fn build(
     let sound = messages.is_empty();
     if !sound || bodies.is_empty() {
         let sources = vec![FaceSource::Organic; brep.faces.len()];
+        let organic = body.shape.share()?;
         let shape = if bodies.is_empty() {
             single(body.shape)?
         } else {
@@ -103,7 +106,13 @@ pub fn build(
         } else {
             inspect::separate_sources(&sources, bodies)?
         };
-        return inspect::report(shape, sources, None, messages, sound, &context, monitor);
+        let made = inspect::Made {
+            shape,
+            organic,
+            sources,
+            checked: None,
+        };
+        return inspect::report(made, messages, sound, &context, monitor);
     }
     let bodies_holes = free_bores(bodies)?;
     let tools: Vec<Option<Shape>> = bodies_holes
@@ -145,16 +154,16 @@ pub fn build(
             Ok(united) => {
                 monitor.step(STAGE, "inspecting", 0.8)?;
                 let sources = inspect::sources(&united.mesh_shape, &united.kinds, &context)?;
-                let checked = Some(united.volume);
-                let mut solid = inspect::report(
-                    united.shape,
+                let made = inspect::Made {
+                    shape: united.shape,
+                    organic: united.organic,
                     sources,
-                    checked,
-                    Vec::new(),
-                    true,
-                    &context,
-                    monitor,
-                )?;
+                    checked: Some(united.volume),
+                };
+                let mut solid = inspect::report(made, Vec::new(), true, &context, monitor)?;
+                for (result, bores) in solid.non_design.iter_mut().zip(&bodies_holes) {
+                    result.bores.clone_from(bores);
+                }
                 if !messages.is_empty() {
                     solid
                         .messages
@@ -181,15 +190,13 @@ pub fn build(
     }
     messages.push("no union passed its checks; the fitted body and the non-design bodies are written side by side".into());
     let sources = inspect::separate_sources(&vec![FaceSource::Organic; brep.faces.len()], bodies)?;
-    inspect::report(
-        side_by_side(&body.shape, bodies)?,
+    let made = inspect::Made {
+        shape: side_by_side(&body.shape, bodies)?,
+        organic: body.shape.share()?,
         sources,
-        None,
-        messages,
-        false,
-        &context,
-        monitor,
-    )
+        checked: None,
+    };
+    inspect::report(made, messages, false, &context, monitor)
 }
 
 /// How far a part is from keeping its non-design bodies: bodies not kept, then the largest distance, mm.

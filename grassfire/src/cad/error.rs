@@ -1,5 +1,6 @@
 //! What can go wrong in the CAD stage.
 
+use crate::io::IoError;
 use crate::monitor::Cancelled;
 
 /// Error of the CAD stage. Trouble with the finished solid is no error: see `CadSolid::valid`.
@@ -80,6 +81,9 @@ pub enum CadError {
         /// What the system said.
         text: String,
     },
+    /// A file cannot be written.
+    #[error(transparent)]
+    File(#[from] IoError),
     /// The user asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -99,6 +103,7 @@ impl CadError {
             Self::OpenMesh { .. } | Self::BadMesh { .. } => {
                 Some("close the mesh, or give the non-design body as STEP".into())
             }
+            Self::File(e) => e.hint(),
             Self::Write { .. } => Some("check that the folder exists and has room".into()),
             _ => None,
         }

@@ -1,6 +1,6 @@
 //! Everything that the report says about the finished part.
 
-use grassfire_occt::{OcctError, Shape, Surface};
+use grassfire_occt::{Face, OcctError, Shape, Surface};
 use serde::Serialize;
 
 use super::bores::Bore;
@@ -27,8 +27,21 @@ pub struct NonDesignResult {
     pub kept: bool,
     /// Radii of its bores, mm.
     pub bore_radii: Vec<f64>,
+    /// Its bores, with the length over which they were cut.
+    pub bores: Vec<Bore>,
     /// Largest distance of its faces in the part to the input, mm.
     pub max_distance: f64,
+}
+
+/// A part to be inspected.
+pub(crate) struct Made {
+    pub(crate) shape: Shape,
+    /// The fitted body in it.
+    pub(crate) organic: Shape,
+    /// Source of each face.
+    pub(crate) sources: Vec<FaceSource>,
+    /// Volume of a shape that BRepCheck has passed, mm3.
+    pub(crate) checked: Option<f64>,
 }
 
 /// What the inspection compares with.
@@ -140,24 +153,43 @@ pub(crate) fn separate_sources(
 ) -> Result<Vec<FaceSource>, OcctError> {
     let mut out = organic.to_vec();
     for (b, body) in bodies.iter().enumerate() {
-        out.extend(std::iter::repeat_n(
-            FaceSource::Body(b as u32),
-            body.solid.counts()?.faces as usize,
-        ));
+        let source = |face: &Face| match bore_of(body, face) {
+            Some(k) => FaceSource::Bore(b as u32, k as u32),
+            None => FaceSource::Body(b as u32),
+        };
+        out.extend(body.solid.faces()?.iter().map(source));
     }
     Ok(out)
 }
 
-/// Measures the part and decides whether it is valid. `checked` is the volume of a shape that BRepCheck has passed.
+/// The bore of a body whose wall a face of it is.
+fn bore_of(body: &NonDesignBody, face: &Face) -> Option<usize> {
+    let Surface::Cylinder {
+        concave: true,
+        radius,
+    } = face.surface
+    else {
+        return None;
+    };
+    body.bores.iter().position(|bore| {
+        (bore.radius - radius).abs() < ON_WALL && bore.distance(face.middle.into()) < ON_WALL
+    })
+}
+
+/// Measures the part and decides whether it is valid.
 pub(crate) fn report(
-    shape: Shape,
-    sources: Vec<FaceSource>,
-    checked: Option<f64>,
+    made: Made,
     mut messages: Vec<String>,
     mut valid: bool,
     context: &Context,
     monitor: &Monitor,
 ) -> Result<CadSolid, CadError> {
+    let Made {
+        shape,
+        organic,
+        sources,
+        checked,
+    } = made;
     let counts = shape.counts()?;
     let volume = match checked {
         Some(volume) => volume,
@@ -174,10 +206,10 @@ pub(crate) fn report(
     let (mut g1_max, mut shortest) = (0.0f64, f64::MAX);
     for edge in shape.edges()? {
         shortest = shortest.min(edge.length);
-        let organic = |f: u32| sources.get(f as usize) == Some(&FaceSource::Organic);
+        let smooth = |f: u32| sources.get(f as usize) == Some(&FaceSource::Organic);
         if let (Some([a, b]), Some(angle)) = (edge.faces, edge.angle)
-            && organic(a)
-            && organic(b)
+            && smooth(a)
+            && smooth(b)
         {
             g1_max = g1_max.max(angle.to_degrees());
         }
@@ -215,6 +247,7 @@ pub(crate) fn report(
     }
     Ok(CadSolid {
         valid,
+        organic,
         bodies: counts.solids as usize,
         faces: counts.faces as usize,
         volume,
@@ -239,13 +272,14 @@ fn separate(body: &NonDesignBody) -> NonDesignResult {
         coverage: 0.0,
         kept: false,
         bore_radii: body.bores.iter().map(|b| b.radius).collect(),
+        bores: body.bores.clone(),
         max_distance: 0.0,
     }
 }
 
 fn united(
     shape: &Shape,
-    faces: &[grassfire_occt::Face],
+    faces: &[Face],
     sources: &[FaceSource],
     b: usize,
     open: bool,
@@ -286,23 +320,16 @@ fn united(
         coverage,
         kept: open && exact && (body.bores.is_empty() || coverage > 0.999),
         bore_radii: body.bores.iter().map(|b| b.radius).collect(),
+        bores: body.bores.clone(),
         max_distance,
     })
 }
 
 /// Area of the walls of a body's bores in the input.
 fn wall_area(body: &NonDesignBody) -> Result<f64, OcctError> {
-    let on_bore = |f: &grassfire_occt::Face| {
-        matches!(f.surface, Surface::Cylinder { concave: true, radius }
-            if body.bores.iter().any(|b| (b.radius - radius).abs() < 1e-6 && b.distance(f.middle.into()) < 1e-6))
-    };
-    Ok(body
-        .solid
-        .faces()?
-        .iter()
-        .filter(|f| on_bore(f))
-        .map(|f| f.area)
-        .sum())
+    let faces = body.solid.faces()?;
+    let walls = faces.iter().filter(|f| bore_of(body, f).is_some());
+    Ok(walls.map(|f| f.area).sum())
 }
 
 /// Tells for each body whether no line along its bores, on the axis or near the wall, meets the part.

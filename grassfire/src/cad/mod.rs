@@ -3,7 +3,7 @@
 //! 1. [`read`] (STEP) or [`from_mesh`] make exact [`NonDesignBody`]s and find their bores.
 //! 2. [`build`] makes the body's B-rep directly (shared edges, exact pcurves, no sewing), fuses the non-design bodies with
 //!    their bores filled, cuts the bores last, and checks every step with volumes that do not come from the CAD kernel.
-//! 3. [`write_step`] and [`tessellate`] give the files.
+//! 3. [`write_step`], [`write_brep`], [`write_iges`], [`write_pieces`] and [`tessellate`] give the files.
 //!
 //! Without the feature `occt` only the options, the error and the recognition of surfaces in meshes ([`primitives`]) are here.
 
@@ -17,6 +17,8 @@ mod bores;
 mod build;
 #[cfg(feature = "occt")]
 mod inspect;
+#[cfg(feature = "occt")]
+mod names;
 #[cfg(feature = "occt")]
 mod non_design;
 #[cfg(feature = "occt")]
@@ -48,7 +50,10 @@ pub use {
         DesignSpace, NonDesignBody, Rebuilt, SpaceBore, from_boss, from_mesh, read,
         read_design_space,
     },
-    output::{tessellate, write_step},
+    output::{
+        ORGANIC_PIECE, piece_name, tessellate, tessellate_solids, write_brep, write_iges,
+        write_pieces, write_step,
+    },
 };
 
 #[cfg(feature = "occt")]

@@ -77,27 +77,28 @@ impl Default for NonDesignOptions {
     }
 }
 
-/// Texts in the STEP file.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+/// Texts in the STEP and IGES files.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StepOptions {
-    /// Product name.
+    /// Product name; empty: the name of the proposal's file.
     pub product: String,
     /// Author.
     pub author: String,
     /// Organization.
     pub organization: String,
+    /// Description; empty: that grassfire made it.
+    pub description: String,
     /// Time stamp of the header (ISO 8601); empty means now. Fix it to get equal files.
     pub time_stamp: String,
 }
 
-impl Default for StepOptions {
-    fn default() -> Self {
-        Self {
-            product: "part".into(),
-            author: String::new(),
-            organization: String::new(),
-            time_stamp: String::new(),
+impl StepOptions {
+    /// The product name, `part` when there is none.
+    pub fn product(&self) -> &str {
+        match self.product.trim() {
+            "" => "part",
+            name => name,
         }
     }
 }

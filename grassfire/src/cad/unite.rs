@@ -38,6 +38,8 @@ pub(crate) enum Kind {
 pub(super) struct United {
     /// The part.
     pub(super) shape: Shape,
+    /// The fitted body that went into it.
+    pub(super) organic: Shape,
     /// The same shape carrying a fine triangulation.
     pub(super) mesh_shape: Shape,
     /// What each face is.
@@ -229,6 +231,7 @@ fn unite(
     regions(&mesh_shape, &at.kinds, context)?;
     Ok(United {
         shape,
+        organic: body.shape.share().map_err(text)?,
         mesh_shape,
         kinds: at.kinds,
         volume,

@@ -21,6 +21,7 @@ mod source;
 mod step;
 mod stl;
 mod threemf;
+mod threemf_write;
 mod vtk;
 mod vtk_array;
 mod vtk_grid;
@@ -38,6 +39,7 @@ pub use medial::{read_medial, read_medial_bytes, write_medial};
 pub use ply_write::{write_ply, write_poles};
 pub use skeleton::{read_skeleton, read_skeleton_bytes, write_skeleton};
 pub use stl::write_stl;
+pub use threemf_write::{ThreeMfObject, ThreeMfTexts, write_3mf};
 
 use crate::mesh::{Repair, TriMesh};
 use crate::monitor::Monitor;

@@ -13,9 +13,12 @@ use crate::skeleton::Skeleton;
 use crate::spline::ControlMesh;
 
 /// All files that a reconstruction may write, and what they hold.
-const FILES: [(&str, &str); 13] = [
+const FILES: [(&str, &str); 16] = [
     ("part.step", "the solid, STEP AP242"),
     ("part.stl", "the solid, triangles"),
+    ("part.3mf", "the solid, triangles with unit and names"),
+    ("part.brep", "the solid, OpenCASCADE's own format"),
+    ("part.igs", "the solid, IGES"),
     ("body.obj", "closed quad control mesh of the body"),
     ("body.stl", "limit surface of the body, triangles"),
     ("skeleton.ply", "quad skeleton with radii, editable"),
@@ -31,6 +34,9 @@ const FILES: [(&str, &str); 13] = [
     ("report.json", "report for programs"),
     ("manifest.json", "inputs, versions, times"),
 ];
+
+/// Folder of the pieces that the part was united from.
+const PIECES: &str = "pieces";
 
 /// The open result folder.
 pub(super) struct Delivery {
@@ -51,7 +57,29 @@ impl Delivery {
         for (name, _) in FILES {
             delivery.remove(name)?;
         }
+        for piece in delivery.pieces() {
+            delivery.remove(&piece)?;
+        }
+        // Something else may lie in it: then it stays.
+        let _ = std::fs::remove_dir(folder.join(PIECES));
         Ok(delivery)
+    }
+
+    /// The files of the pieces that are there: `organic.step` and `body-*.step`.
+    fn pieces(&self) -> Vec<String> {
+        let Ok(entries) = std::fs::read_dir(self.folder.join(PIECES)) else {
+            return Vec::new();
+        };
+        let ours = |name: &String| {
+            name == "organic.step" || name.starts_with("body-") && name.ends_with(".step")
+        };
+        let names = entries.filter_map(|e| e.ok()?.file_name().into_string().ok());
+        let mut out: Vec<String> = names
+            .filter(ours)
+            .map(|name| format!("{PIECES}/{name}"))
+            .collect();
+        out.sort_unstable();
+        out
     }
 
     pub(super) fn path(&self, name: &str) -> PathBuf {
@@ -114,7 +142,7 @@ impl Delivery {
         report: &mut Report,
         pictures: &[Picture],
     ) -> Result<(), StageError> {
-        let entry = |&(name, text): &(&str, &str)| {
+        let entry = |(name, text): (&str, &str)| {
             let bytes = std::fs::metadata(self.path(name)).ok()?.len();
             Some(FileEntry {
                 path: name.to_owned(),
@@ -122,7 +150,23 @@ impl Delivery {
                 bytes,
             })
         };
-        report.files = FILES.iter().filter_map(entry).collect();
+        let pieces = self.pieces();
+        let pieces = pieces.iter().map(|name| {
+            let organic = name.ends_with("organic.step");
+            let body = report
+                .non_design
+                .iter()
+                .find(|b| b.piece.as_deref() == Some(name));
+            let text = match body {
+                _ if organic => "piece of the solid: the fitted body".to_owned(),
+                Some(body) => format!("piece of the solid: {}, bores filled", body.name),
+                None => "piece of the solid".to_owned(),
+            };
+            (name.as_str(), text)
+        });
+        let pieces: Vec<(&str, String)> = pieces.collect();
+        let pieces = pieces.iter().map(|(name, text)| (*name, text.as_str()));
+        report.files = FILES.into_iter().chain(pieces).filter_map(entry).collect();
         report::write_html(&self.path("report.html"), report, pictures)?;
         report::write_json(&self.path("report.json"), report)?;
         Ok(self.manifest(report)?)

@@ -6,7 +6,7 @@ use crate::cad::CadError;
 use crate::fit::FitError;
 use crate::io::IoError;
 use crate::medial::MedialError;
-use crate::mesh::RepairError;
+use crate::mesh::{RepairError, SolidError};
 use crate::monitor::Cancelled;
 use crate::remesh::RemeshError;
 use crate::report::ReportError;
@@ -67,6 +67,15 @@ pub enum StageError {
     DesignSpace { path: PathBuf },
     #[error("retry.quad_sizes is empty: no quad size to try")]
     NoQuadSize,
+    #[error("the format {format} cannot be written: this build has no OpenCASCADE")]
+    Format { format: &'static str },
+    #[error(
+        "files.chord is {chord} mm; {} or more wanted",
+        super::exchange::MIN_CHORD
+    )]
+    Chord { chord: f64 },
+    #[error("the triangles of {name} do not close: {source}")]
+    Open { name: String, source: SolidError },
 }
 
 impl PipelineError {
@@ -77,7 +86,7 @@ impl PipelineError {
         }
         match self.source {
             StageError::Io(_) | StageError::Repair(_) | StageError::Remesh(_) => 2,
-            _ if matches!(self.stage, "read" | "non_design" | "recognise") => 2,
+            _ if matches!(self.stage, "options" | "read" | "non_design" | "recognise") => 2,
             _ => 3,
         }
     }
@@ -105,6 +114,11 @@ impl PipelineError {
             }
             StageError::Unit { bodies, proposal } => Some(unit_hint(bodies / proposal)),
             StageError::DesignSpace { .. } => Some("export it from CAD as STEP".into()),
+            StageError::Format { .. } => Some("build with the default feature occt".into()),
+            StageError::Chord { .. } => {
+                Some("leave it out, or give a length such as files.chord=0.02".into())
+            }
+            StageError::Open { .. } => Some("a smaller files.chord may help".into()),
             StageError::NoQuadSize => {
                 Some("give at least one factor, such as retry.quad_sizes=[1.0]".into())
             }

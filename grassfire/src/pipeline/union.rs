@@ -1,20 +1,24 @@
 //! The finished part: the CAD solid united with the non-design bodies or, without OpenCASCADE, the limit surface.
 
+use super::ReconstructOptions;
 use super::bodies::Bodies;
 use super::error::StageError;
-use super::shape::Surface;
-use super::{ReconstructOptions, deliver::Delivery};
 #[cfg(feature = "occt")]
-use crate::cad::{self, CadSolid, NonDesignResult, StepOptions};
+use super::exchange::Format;
+use super::shape::Surface;
+#[cfg(feature = "occt")]
+use crate::cad::{self, CadSolid, NonDesignResult};
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
+#[cfg(feature = "occt")]
+use crate::report::BoreBlock;
 use crate::report::{NonDesignBlock, SolidBlock};
 use crate::topology::Betti;
 
 /// The finished part.
 pub(super) struct Part {
     #[cfg(feature = "occt")]
-    solid: CadSolid,
+    pub(super) solid: CadSolid,
     /// Its triangles; tag 0 for the fitted body, 1 + index for non-design bodies.
     pub(super) mesh: TriMesh,
     /// Volume, mm3.
@@ -29,7 +33,7 @@ pub(super) struct Part {
 
 /// Chord of the part's triangles, voxels: well below what any figure of the report resolves.
 #[cfg(feature = "occt")]
-const CHORD: f64 = 0.05;
+pub(super) const CHORD: f64 = 0.05;
 
 impl Part {
     /// What speaks against this part of topology `wanted`, when anything does.
@@ -116,7 +120,10 @@ pub(super) fn united(
         .iter()
         .map(|body| body.max_distance)
         .reduce(f64::max);
-    let non_design = solid.non_design.iter().map(entry).collect();
+    let pieces = options.files.formats.contains(&Format::Pieces);
+    let piece = |b: usize| pieces.then(|| format!("pieces/{}", cad::piece_name(b)));
+    let numbered = solid.non_design.iter().enumerate();
+    let non_design = numbered.map(|(b, body)| entry(body, piece(b))).collect();
     Ok(Part {
         mesh: triangles,
         volume: solid.volume,
@@ -128,7 +135,7 @@ pub(super) fn united(
 }
 
 #[cfg(feature = "occt")]
-fn entry(body: &NonDesignResult) -> NonDesignBlock {
+fn entry(body: &NonDesignResult, piece: Option<String>) -> NonDesignBlock {
     NonDesignBlock {
         name: body.name.clone(),
         source: body.source.clone(),
@@ -136,18 +143,21 @@ fn entry(body: &NonDesignResult) -> NonDesignBlock {
         coverage: body.coverage,
         kept: body.kept,
         bore_radii: body.bore_radii.clone(),
+        bores: body.bores.iter().map(bore).collect(),
+        piece,
     }
 }
 
-/// Writes `part.step` and `part.stl`.
 #[cfg(feature = "occt")]
-pub(super) fn deliver(part: &Part, product: &str, delivery: &Delivery) -> Result<(), StageError> {
-    let step = StepOptions {
-        product: product.to_owned(),
-        ..StepOptions::default()
-    };
-    cad::write_step(&part.solid, &delivery.path("part.step"), &step)?;
-    Ok(delivery.stl("part.stl", &part.mesh)?)
+fn bore(bore: &cad::Bore) -> BoreBlock {
+    let [from, to] = bore.extent;
+    BoreBlock {
+        origin: bore.origin.into(),
+        axis: bore.direction.into(),
+        radius: bore.radius,
+        extent: bore.extent,
+        cut: [from - bore.extension[0], to + bore.extension[1]],
+    }
 }
 
 /// Without OpenCASCADE there are no bodies to take away.
@@ -189,10 +199,4 @@ pub(super) fn united(
         block: None,
         non_design: Vec::new(),
     })
-}
-
-/// Writes `part.stl`.
-#[cfg(not(feature = "occt"))]
-pub(super) fn deliver(part: &Part, _product: &str, delivery: &Delivery) -> Result<(), StageError> {
-    Ok(delivery.stl("part.stl", &part.mesh)?)
 }

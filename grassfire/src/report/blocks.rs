@@ -59,6 +59,18 @@ pub struct Report {
     pub papers: Vec<String>,
     /// Files that were written.
     pub files: Vec<FileEntry>,
+    /// Files that were asked for and could not be written.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub refused: Vec<RefusedFile>,
+}
+
+/// A file that was asked for and could not be written.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct RefusedFile {
+    /// Name inside the output folder.
+    pub path: String,
+    /// Why.
+    pub reason: String,
 }
 
 /// A file that was read.
@@ -294,6 +306,27 @@ pub struct NonDesignBlock {
     pub kept: bool,
     /// Radii of its bores, mm.
     pub bore_radii: Vec<f64>,
+    /// Its bores.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bores: Vec<BoreBlock>,
+    /// The file with the body alone, its bores filled; present with the format `pieces`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub piece: Option<String>,
+}
+
+/// A bore of a non-design body.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct BoreBlock {
+    /// Point of the axis, mm.
+    pub origin: [f64; 3],
+    /// Unit direction of the axis.
+    pub axis: [f64; 3],
+    /// Radius, mm.
+    pub radius: f64,
+    /// Where its wall begins and ends, mm along the axis from the origin.
+    pub extent: [f64; 2],
+    /// Where it was cut out of the part: beyond open ends.
+    pub cut: [f64; 2],
 }
 
 /// A surface or a boss that was recognised in the proposal.

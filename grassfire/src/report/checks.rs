@@ -79,6 +79,11 @@ pub fn judge(report: &Report, limits: &Limits) -> Vec<Check> {
     }
     solid(report, limits, &mut checks);
     fidelity(report, limits, &mut checks);
+    if !report.refused.is_empty() {
+        let text = "Every file asked for is written";
+        let missing = report.refused.len() as f64;
+        checks.push(check("files", text, missing, 0.0, DEFECTS));
+    }
     checks
 }
 

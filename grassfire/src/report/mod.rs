@@ -18,9 +18,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 pub use blocks::{
-    BodyBlock, CandidateBlock, CornerDeviation, DesignFaceBlock, DistanceBlock, FileEntry,
-    InputBlock, InputFile, NonDesignBlock, RadiusRange, RemeshBlock, RepairEntry, Report,
-    SkeletonBlock, SolidBlock, StageEntry, TopologyBlock, TopologyChangeEntry, VolumeBlock,
+    BodyBlock, BoreBlock, CandidateBlock, CornerDeviation, DesignFaceBlock, DistanceBlock,
+    FileEntry, InputBlock, InputFile, NonDesignBlock, RadiusRange, RefusedFile, RemeshBlock,
+    RepairEntry, Report, SkeletonBlock, SolidBlock, StageEntry, TopologyBlock, TopologyChangeEntry,
+    VolumeBlock,
 };
 pub use checks::{Check, Limits, judge};
 pub use html::to_html;

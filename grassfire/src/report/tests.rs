@@ -97,6 +97,14 @@ fn good_report_meets_all_checks() {
 }
 
 #[test]
+fn a_file_that_was_refused_misses_a_check() {
+    let mut report = report();
+    assert_eq!(verdict(&report, "files"), None);
+    report.refused.push(RefusedFile::default());
+    assert_eq!(verdict(&report, "files"), Some(false));
+}
+
+#[test]
 fn each_defect_misses_its_check() {
     type Damage = fn(&mut Report);
     let cases: [(&str, Damage); 9] = [
