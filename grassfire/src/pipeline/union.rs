@@ -152,3 +152,7 @@ pub(super) fn part(
 pub(super) fn deliver(part: &Part, _product: &str, delivery: &Delivery) -> Result<(), StageError> {
     Ok(delivery.stl("part.stl", &part.mesh)?)
 }
+
+#[cfg(all(test, feature = "occt"))]
+#[path = "union_tests.rs"]
+mod tests;
