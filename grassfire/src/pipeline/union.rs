@@ -75,6 +75,7 @@ pub(super) fn part(
         area: solid.area,
         genus: solid.genus,
         g1_max: surface.g1.max_angle_deg.max(solid.g1_max),
+        curvature_jump: (&surface.curvature).into(),
         shortest_edge: solid.shortest_edge,
         max_tolerance: solid.max_tolerance,
         volume_check: solid.volume_check,
@@ -129,10 +130,10 @@ pub(super) fn part(
     _options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Part, StageError> {
-    let kink = surface.g1.max_angle_deg;
+    let (kink, jump) = (surface.g1.max_angle_deg, surface.curvature.max);
     monitor.warn(
         "cad",
-        format!("this build has no OpenCASCADE: body.obj, body.stl and part.stl are written (largest kink {kink:.1e} degrees), no STEP"),
+        format!("this build has no OpenCASCADE: body.obj, body.stl and part.stl are written (largest kink {kink:.1e} degrees, largest jump of curvature {jump:.2} 1/mm), no STEP"),
     );
     let mesh = TriMesh {
         tags: Vec::new(),

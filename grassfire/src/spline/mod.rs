@@ -4,6 +4,7 @@ mod bezier;
 mod blocks;
 mod brep;
 mod corner;
+mod curvature;
 mod error;
 mod gauss;
 pub(crate) mod half_edges;
@@ -17,6 +18,7 @@ mod tessellate;
 
 pub use bezier::{SurfacePoint, evaluate};
 pub use brep::{BrepOptions, FaceMode, build_brep};
+pub use curvature::{CurvatureJump, curvature_jump};
 pub use error::SplineError;
 pub use measure::{area, volume};
 pub use patches::{PatchOptions, patches};
