@@ -10,7 +10,7 @@ use grassfire::monitor::Monitor;
 use grassfire::pipeline::{Outcome, ReconstructJob, ReconstructOptions, reconstruct};
 use grassfire::report;
 
-use crate::args::{DemoArgs, Example, Recognise, ReconstructArgs, RunArgs};
+use crate::args::{DemoArgs, Example, Faces, Recognise, ReconstructArgs, RunArgs};
 use crate::failure::{Failure, chain};
 use crate::progress::{Bar, Shared, Talk};
 use crate::{settings, summary};
@@ -32,6 +32,14 @@ pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
             Recognise::Auto => "auto",
         };
         ("non_design.recognise", mode.to_owned())
+    }));
+    short.extend(args.faces.map(|mode| {
+        let mode = match mode {
+            Faces::Exact => "exact",
+            Faces::Fewest => "fewest",
+            Faces::Quads => "quads",
+        };
+        ("brep.faces", mode.to_owned())
     }));
     let job = ReconstructJob {
         part: args.part.clone(),

@@ -5,6 +5,7 @@
 mod bodies;
 mod deliver;
 mod error;
+mod fewest;
 mod illustrate;
 mod inputs;
 mod measure;
@@ -165,6 +166,7 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         options,
         monitor,
     )?;
+    let shape = fewest::fewest(&mut record, shape, voxel, options, monitor)?;
     record.report.topology = Some(measure::topology_block(&axis, &shape));
     record.report.skeleton = Some(measure::skeleton_block(&axis, &shape));
     record.report.body = Some(measure::body_block(&shape));
@@ -194,6 +196,9 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         recognise::left_out(&mut record.report.candidates);
     }
     record.report.solid = part.block.clone();
+    if let Some(solid) = &mut record.report.solid {
+        solid.faces_deviation = shape.faces_deviation;
+    }
     record.report.non_design = part.non_design.clone();
     record.stage("write", || {
         union::deliver(&part, &product_name(&job.part), &delivery)

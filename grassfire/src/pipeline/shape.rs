@@ -44,6 +44,8 @@ pub(super) struct Shape {
     pub(super) fitted: Fitted,
     /// The body does not come from the skeleton but is wrapped around the proposal.
     pub(super) wrapped: bool,
+    /// How far the surface moved for the sake of fewer faces, mm; none when that was not asked for.
+    pub(super) faces_deviation: Option<f64>,
 }
 
 /// The smooth surface of the body.
@@ -199,6 +201,7 @@ impl Workshop<'_> {
             body,
             fitted,
             wrapped,
+            faces_deviation: None,
         };
         Ok((score, shape))
     }

@@ -79,6 +79,7 @@ pub(super) fn part(
         shortest_edge: solid.shortest_edge,
         max_tolerance: solid.max_tolerance,
         volume_check: solid.volume_check,
+        faces_deviation: None,
     };
     let triangles = cad::tessellate(&solid, CHORD * voxel)?;
     let non_design_max = solid

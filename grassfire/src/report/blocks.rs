@@ -249,6 +249,9 @@ pub struct SolidBlock {
     pub max_tolerance: f64,
     /// Relative difference between the CAD kernel's volume and ours.
     pub volume_check: f64,
+    /// How far the surface moved for the sake of fewer faces (`brep.faces = fewest`), mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub faces_deviation: Option<f64>,
 }
 
 /// Jump of the normal curvature across the edges of all faces around extraordinary points.
