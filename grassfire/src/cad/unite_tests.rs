@@ -179,7 +179,7 @@ fn silent_loss_is_caught_and_every_retry_is_taken_in_order()
     let (right, calls) = with_wrong_kernel(0)?;
     assert!(right.valid, "{:?}", right.messages);
     assert!(right.messages.is_empty() && calls.len() == 1);
-    for wrong in 1..ATTEMPTS.len() {
+    for (wrong, next) in ATTEMPTS.iter().enumerate().skip(1) {
         let (solid, _) = with_wrong_kernel(wrong)?;
         assert!(solid.valid, "{:?}", solid.messages);
         assert_eq!(solid.messages.len(), wrong + 1, "{:?}", solid.messages);
@@ -187,7 +187,7 @@ fn silent_loss_is_caught_and_every_retry_is_taken_in_order()
             assert!(message.starts_with(&format!("{} failed", attempt.text)));
             assert!(message.contains("independent rays"), "{message}");
         }
-        let passed = format!("passed: {}", ATTEMPTS[wrong].text);
+        let passed = format!("passed: {}", next.text);
         assert_eq!(solid.messages[wrong], passed);
         let difference = (solid.volume - right.volume).abs();
         // The shift moves the slab by 0.03 mm.

@@ -15,8 +15,9 @@ mod motorcycle;
 mod patches;
 mod quality;
 mod refit;
+mod removal;
 mod stencils;
-mod strips;
+
 mod tessellate;
 
 pub use bezier::{SurfacePoint, evaluate};
@@ -27,7 +28,7 @@ pub use error::SplineError;
 pub use measure::{area, volume};
 pub use patches::{PatchOptions, patches};
 pub use quality::{G1Report, Jacobian, g1_max, jacobians};
-pub use strips::{StripStep, take_strip_out};
+pub use removal::{CoarserStep, take_quads_out};
 pub use tessellate::{SurfaceSample, TessellateOptions, Tessellation, tessellate};
 pub mod catmull_clark;
 
