@@ -1,5 +1,6 @@
 #!/bin/bash
-# Re-reads a run's STEP with gmsh and with OCP (another OpenCASCADE) and compares with report.json.
+# Re-reads a run's STEP with gmsh and with OCP (another OpenCASCADE), compares with report.json, meshes it at two sizes and
+# edits it.
 # Skipped with a notice when Python or PyPI are not there.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -17,4 +18,4 @@ if ! "$venv/bin/python" -c 'import gmsh, numpy; from OCP.STEPControl import STEP
     || skip "pip could not install gmsh, cadquery-ocp and numpy ($(tail -n 1 "$venv/pip.log"))"
 fi
 problem=$("$venv/bin/python" -c 'import gmsh, numpy; from OCP.STEPControl import STEPControl_Reader' 2>&1) || skip "$(tail -n 1 <<<"$problem")"
-"$venv/bin/python" tools/verify_step.py "$folder"
+"$venv/bin/python" tools/verify_step.py --mesh auto --edit "$folder"

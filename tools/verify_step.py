@@ -1,11 +1,19 @@
 #!/usr/bin/env python3
 """Reads STEP files with two programs other than grassfire's own kernel and prints what they find.
 
-    verify_step.py FOLDER|PART.step [...] [--volume MM3] [--genus N] [--solids N] [--mesh H] [--json]
+    verify_step.py FOLDER|PART.step [...] [--volume MM3] [--genus N] [--solids N] [--mesh H[,H...]] [--edit] [--json]
 
-A FOLDER is the output of a run: its part.step is compared with its report.json. Prints one line a file, or one JSON
-object a line; exit code 1 when a check fails: valid, closed, both readers agree, and volume (1e-4), genus, number of
-solids and names of faces as in the report or as given. `--mesh H` also makes a tetrahedral mesh of size H with gmsh.
+A FOLDER is the output of a run: its part.step is compared with its report.json. Prints one line a file and a table of
+what was tried with it, or one JSON object a line; exit code 1 when a check fails: valid, closed, both readers agree, and
+volume (1e-4), genus, number of solids and names of faces as in the report or as given.
+
+`--mesh H` makes a tetrahedral mesh with gmsh, once a size (mm; `auto` takes a 140th and a 100th of the diagonal); every
+face and the solid must be meshed, while the quality of the elements is only told: SICN, the signed inverse condition
+number, 1 for a regular tetrahedron, 0 for a flat one.
+
+`--edit` edits the part as a CAD user would: rounds an edge of a boss, and moves a plane face outward by 0.5 mm; both must
+leave one valid solid with the volume that the edit asks for. Where there is no boss edge or no plane that can be edited,
+it says so.
 
 Needs gmsh and cadquery-ocp (7.7 or newer, 8 too).
 """
@@ -13,6 +21,8 @@ import argparse
 import json
 import sys
 from pathlib import Path
+
+import verify_edits
 
 VOLUME_LIMIT = 1e-4
 # gmsh integrates with the kernel's default rule, which can be 1 % wrong on faces of many spans: it is compared with that
@@ -108,21 +118,35 @@ def read_ocp(path):
 def tetrahedra(size):
     """Meshes the open gmsh model."""
     import gmsh
+    import numpy
 
+    gmsh.model.mesh.clear()
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
     gmsh.option.setNumber("Mesh.MeshSizeMin", min(0.3, size))
     gmsh.option.setNumber("Mesh.Algorithm3D", 10)
+    row = {"size": size, "failed_faces": 0, "tetrahedra": 0}
     try:
         gmsh.model.mesh.generate(3)
-        tags = [t for block in gmsh.model.mesh.getElements(3)[1] for t in block]
-        quality = gmsh.model.mesh.getElementQualities(tags, "minSICN")
     except Exception as e:  # gmsh raises plain Exception
-        return {"mesh_error": str(e)}
-    return {"tetrahedra": len(tags), "min_quality": float(min(quality)), "inverted": int(sum(q <= 0 for q in quality))}
+        row["error"] = str(e)
+    faces = [tag for _, tag in gmsh.model.getEntities(2)]
+    row["failed_faces"] = sum(not any(len(t) for t in gmsh.model.mesh.getElements(2, tag)[1]) for tag in faces)
+    tags = [t for block in gmsh.model.mesh.getElements(3)[1] for t in block]
+    if tags:
+        quality = numpy.array(gmsh.model.mesh.getElementQualities(tags, "minSICN"))
+        row |= {
+            "tetrahedra": len(tags),
+            "min_sicn": float(quality.min()),
+            "low_sicn": float(numpy.quantile(quality, 0.01)),
+            "mean_sicn": float(quality.mean()),
+            "below_tenth": int((quality < 0.1).sum()),
+            "inverted": int((quality <= 0).sum()),
+        }
+    return row
 
 
-def read_gmsh(path, size):
-    """Bodies, faces and volume, and the mesh when `size` is given."""
+def read_gmsh(path, sizes):
+    """Bodies, faces and volume, and a mesh of each size."""
     import gmsh
 
     gmsh.initialize(interruptible=False)
@@ -135,8 +159,12 @@ def read_gmsh(path, size):
         "faces": len(gmsh.model.getEntities(2)),
         "volume": sum(gmsh.model.occ.getMass(3, tag) for _, tag in solids),
     }
-    if size:
-        out |= tetrahedra(size)
+    if sizes == ["auto"]:
+        box = gmsh.model.getBoundingBox(-1, -1)
+        diagonal = sum((box[d + 3] - box[d]) ** 2 for d in range(3)) ** 0.5
+        sizes = [round(diagonal / n, 3) for n in (140, 100)]
+    if sizes:
+        out["meshes"] = [tetrahedra(float(size)) for size in sizes]
     gmsh.finalize()
     return out
 
@@ -176,18 +204,48 @@ def faults(ocp, gm, want):
         have = sum(n for face, n in ocp["names"].items() if face == name or face.startswith(name + ": "))
         if count is not None and have != count:
             out.append(f"{have} faces are named after {name} instead of {count}")
-    if "mesh_error" in gm:
-        out.append(f"gmsh cannot mesh it: {gm['mesh_error']}")
+    for row in gm.get("meshes", []):
+        what = f"at {row['size']} mm"
+        if "error" in row:
+            out.append(f"gmsh cannot mesh it {what}: {row['error']}")
+        elif row["failed_faces"]:
+            out.append(f"gmsh leaves {row['failed_faces']} faces without a mesh {what}")
+        elif not row["tetrahedra"] or row["inverted"]:
+            out.append(f"gmsh makes {row['tetrahedra']} tetrahedra, {row.get('inverted', 0)} of them inverted, {what}")
     return out
+
+
+def table(gm, edits):
+    """What was tried, as lines."""
+    lines = []
+    if gm.get("meshes"):
+        lines.append("    mesh mm  tetrahedra  failed faces  SICN min   1 %   mean  below 0.1")
+        for row in gm["meshes"]:
+            quality = ("{min_sicn:8.4f}  {low_sicn:5.3f}  {mean_sicn:5.3f}  {below_tenth:9}" if row["tetrahedra"] else row.get("error", "")).format(**row)
+            lines.append(f"    {row['size']:7.3f}  {row['tetrahedra']:10}  {row['failed_faces']:12}  {quality}")
+    for edit in edits:
+        lines.append("    " + edit_line(edit))
+    return lines
+
+
+def edit_line(edit):
+    """One edit in words."""
+    if "skipped" in edit:
+        return f"{edit['edit']}: skipped, {edit['skipped']}"
+    verdict = "works" if edit["ok"] else f"FAILS: {edit['error']}"
+    volume = f", {edit['change']:+.3f} mm3 ({edit['wanted']} wanted)" if "change" in edit else ""
+    return f"{edit['edit']} on {edit['place']}: {verdict}{volume}; {edit['tries']} tried, {edit['seconds']:.1f} s"
 
 
 def check(path, args):
     """Checks one file or folder and prints; true when all is well."""
     step, want = expected(Path(path), args)
     ocp, gm = read_ocp(step), read_gmsh(step, args.mesh)
+    edits = verify_edits.edits(step) if args.edit else []
     bad = faults(ocp, gm, want)
+    bad += [edit_line(edit) for edit in edits if not edit.get("ok", True)]
     if args.json:
-        print(json.dumps({"file": str(step), "ok": not bad, "faults": bad, "ocp": ocp, "gmsh": gm}))
+        print(json.dumps({"file": str(step), "ok": not bad, "faults": bad, "ocp": ocp, "gmsh": gm, "edits": edits}))
     else:
         error = "" if want["volume"] is None else f" ({ocp['volume'] / want['volume'] - 1:+.1e} to the report)"
         print(
@@ -195,6 +253,8 @@ def check(path, args):
             f"{ocp['faces']} faces, genus {ocp['genus']}, {ocp['volume']:.2f} mm3{error}"
             + "".join(f"; {text}" for text in bad)
         )
+        for line in table(gm, edits):
+            print(line)
     return not bad
 
 
@@ -204,7 +264,8 @@ def main():
     parser.add_argument("--volume", type=float)
     parser.add_argument("--genus", type=int)
     parser.add_argument("--solids", type=int)
-    parser.add_argument("--mesh", type=float, default=0.0)
+    parser.add_argument("--mesh", type=lambda text: text.split(","), default=[])
+    parser.add_argument("--edit", action="store_true")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
     sys.exit(0 if all([check(path, args) for path in args.files]) else 1)

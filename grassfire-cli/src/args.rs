@@ -69,6 +69,9 @@ pub struct ReconstructArgs {
     /// Quad skeleton to use instead of our own (PLY or OBJ)
     #[arg(long, value_name = "FILE")]
     pub skeleton: Option<PathBuf>,
+    /// How quads are put together to faces (brep.faces)
+    #[arg(long, value_enum, value_name = "MODE")]
+    pub faces: Option<Faces>,
     /// Edge of a voxel, mm (remesh.voxel)
     #[arg(long, value_name = "MM", value_parser = positive, allow_negative_numbers = true)]
     pub voxel: Option<f64>,
@@ -117,6 +120,17 @@ pub enum FileFormat {
     ThreeMf,
     /// pieces/: the fitted body and each non-design body as STEP, for tools/freecad_tree.py
     Pieces,
+}
+
+/// How many faces the solid gets.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Faces {
+    /// As few as there are without changing the surface
+    Exact,
+    /// Fewer, by a coarser control mesh; the surface moves by half a voxel at most (brep.tolerance)
+    Fewest,
+    /// One a quad
+    Quads,
 }
 
 /// Arguments of `demo`.

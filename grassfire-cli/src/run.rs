@@ -10,7 +10,7 @@ use grassfire::monitor::Monitor;
 use grassfire::pipeline::{Format, Outcome, ReconstructJob, ReconstructOptions, reconstruct};
 use grassfire::report;
 
-use crate::args::{DemoArgs, Example, FileFormat, Recognise, ReconstructArgs, RunArgs};
+use crate::args::{DemoArgs, Example, Faces, FileFormat, Recognise, ReconstructArgs, RunArgs};
 use crate::failure::{Failure, chain};
 use crate::progress::{Bar, Shared, Talk};
 use crate::{settings, summary};
@@ -36,6 +36,14 @@ pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
     if !args.format.is_empty() {
         short.push(("files.formats", formats(&args.format)));
     }
+    short.extend(args.faces.map(|mode| {
+        let mode = match mode {
+            Faces::Exact => "exact",
+            Faces::Fewest => "fewest",
+            Faces::Quads => "quads",
+        };
+        ("brep.faces", mode.to_owned())
+    }));
     let job = ReconstructJob {
         part: args.part.clone(),
         non_design: args.non_design.clone(),

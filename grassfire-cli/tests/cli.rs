@@ -92,6 +92,8 @@ fn reconstruct_help_is_complete() {
           --recognise <MODE>     What to do with bores and bosses recognised in the part
                                  (non_design.recognise) [possible values: off, list, auto]
           --skeleton <FILE>      Quad skeleton to use instead of our own (PLY or OBJ)
+          --faces <MODE>         How quads are put together to faces (brep.faces) [possible values:
+                                 exact, fewest, quads]
           --voxel <MM>           Edge of a voxel, mm (remesh.voxel)
           --quad-size <MM>       Edge of a skeleton quad, mm (skeleton.quad_size)
           --iso <VALUE>          Density at which material begins (read.threshold)

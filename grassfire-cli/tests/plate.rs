@@ -149,6 +149,72 @@ fn a_missed_check_ends_with_1_and_everything_is_written() {
     assert!(run.output.join("report.html").is_file() && run.output.join("body.obj").is_file());
 }
 
+#[test]
+fn fewest_faces_are_as_smooth_and_stay_near() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let faces = |mode: &str| {
+        let run = run(folder.path(), &["--faces", mode]);
+        assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+        run.report()
+    };
+    let [exact, fewest, quads] = ["exact", "fewest", "quads"].map(faces);
+    if cfg!(feature = "occt") {
+        let count = |report: &Value| number(report, "/solid/faces");
+        assert!(count(&fewest) <= count(&exact) && count(&exact) < count(&quads));
+        for report in [&exact, &fewest, &quads] {
+            assert!(number(report, "/solid/g1_max") <= 0.01);
+            let jump = number(report, "/solid/curvature_jump/max");
+            assert!(jump.is_finite() && number(report, "/solid/curvature_jump/rms") <= jump);
+        }
+        assert!(number(&fewest, "/solid/faces_deviation") <= 0.5 * 0.8);
+        assert!(exact["solid"].get("faces_deviation").is_none());
+    }
+}
+
+/// A cube of 4 mm with its low corner at `x` as a text STL.
+fn cube(x: f64) -> String {
+    let quads = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let mut text = "solid cube\n".to_owned();
+    for [a, b, c, d] in quads {
+        for triangle in [[a, b, c], [a, c, d]] {
+            text += "facet normal 0 0 0\nouter loop\n";
+            for corner in triangle {
+                let at = |d: u32| f64::from(corner >> d & 1) * 4.0;
+                text += &format!("vertex {} {} {}\n", x + at(0), at(1), at(2));
+            }
+            text += "endloop\nendfacet\n";
+        }
+    }
+    text + "endsolid cube\n"
+}
+
+#[test]
+fn a_body_that_cannot_be_united_ends_with_1_and_lies_beside_the_part() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let loose = folder.path().join("loose.stl");
+    std::fs::write(&loose, cube(60.0)).expect("writes");
+    let run = run(
+        folder.path(),
+        &["--non-design", &loose.display().to_string()],
+    );
+    if cfg!(feature = "occt") {
+        assert_eq!(run.code, Some(1), "{}{}", run.stdout, run.stderr);
+        let report = run.report();
+        assert_eq!(report["solid"]["valid"], false);
+        assert_eq!(report["solid"]["bodies"], 2);
+        assert!(run.stderr.contains("does not overlap"), "{}", run.stderr);
+        let step = String::from_utf8_lossy(&run.file("part.step")).into_owned();
+        assert!(step.contains("NOT VALID"));
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn ctrl_c_ends_with_130_and_leaves_no_half_written_file() {

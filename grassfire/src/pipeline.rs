@@ -7,6 +7,7 @@ mod construct;
 mod deliver;
 mod error;
 mod exchange;
+mod fewest;
 mod illustrate;
 mod inputs;
 mod measure;
@@ -180,6 +181,9 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         recognise::left_out(&mut record.report.candidates);
     }
     record.report.solid = part.block.clone();
+    if let Some(solid) = &mut record.report.solid {
+        solid.faces_deviation = shape.faces_deviation;
+    }
     record.report.non_design = part.non_design.clone();
     record.report.refused = record.stage("write", || {
         let files = exchange::Files {

@@ -48,7 +48,11 @@ fn written(
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("part.step");
     let faces = patches(mesh, &PatchOptions::default(), &monitor)?;
-    let brep = build_brep(mesh, &faces, &BrepOptions { faces: mode }, &monitor)?;
+    let options = BrepOptions {
+        faces: mode,
+        ..BrepOptions::default()
+    };
+    let brep = build_brep(mesh, &faces, &options, &monitor)?;
     let solid = build(&brep, bodies, &CadOptions::default(), &monitor)?;
     assert!(solid.valid, "{:?}", solid.messages);
     write_step(&solid, &path, &StepOptions::default())?;
@@ -103,7 +107,7 @@ fn every_patch_evaluates_to_the_same_points() -> Result {
 
 #[test]
 fn every_block_holds_the_middles_of_its_patches() -> Result {
-    let (ours, theirs, counted) = written(&body(), FaceMode::Blocks, &[])?;
+    let (ours, theirs, counted) = written(&body(), FaceMode::Exact, &[])?;
     assert_eq!(theirs.len(), counted);
     assert!(counted < ours.len());
     let middles: Vec<Vec3> = ours
@@ -167,7 +171,7 @@ fn a_bore_is_a_cylinder_of_its_radius_for_others_too() -> Result {
         &NonDesignOptions::default(),
         &Monitor::default(),
     )?;
-    let (_, theirs, counted) = written(&body(), FaceMode::Blocks, &bodies)?;
+    let (_, theirs, counted) = written(&body(), FaceMode::Exact, &bodies)?;
     assert_eq!(theirs.len(), counted);
     let walls: Vec<f64> = theirs
         .iter()

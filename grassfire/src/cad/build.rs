@@ -5,8 +5,8 @@ use grassfire_occt::{BrepDescription, OcctError, Operation, Shape};
 use super::bores::{self, Bore};
 use super::inspect::{self, NonDesignResult};
 use super::non_design::NonDesignBody;
-use super::reference;
-use super::unite::{ATTEMPTS, Inputs};
+use super::reference::{self, Probe};
+use super::unite::{ATTEMPTS, Inputs, Kernel, kernel, shift};
 use super::{CadError, CadOptions, array, patches, shells, split};
 use crate::Vec3;
 use crate::monitor::Monitor;
@@ -71,13 +71,25 @@ pub(super) const IDENTITY: f64 = 1e-6;
 /// 2. Fuse all non-design bodies with their bores filled, then cut the bores: organic material never stays in a bore.
 /// 3. Check the union: no warnings, BRepCheck, closed, number of solids, inclusion-exclusion to 1e-6, and the volume,
 ///    the common part, the removed part and each body's region against ray integrals that use no boolean.
-/// 4. When a check fails or a non-design body is not kept exactly: faces near the non-design bodies cut into single polynomials, then also a larger fuzzy value, a
-///    small shift of the fitted body, one body at a time; at last the bodies side by side with `valid = false`.
+/// 4. When a check fails or a non-design body is not kept exactly: a larger fuzzy value; faces near the non-design bodies
+///    cut into single polynomials, also with the larger fuzzy value, then after a small shift of the fitted body, then one
+///    body at a time; at last the bodies side by side with `valid = false`.
 ///
 /// # Errors
 /// [`CadError::BadBrep`], [`CadError::MisplacedShell`], [`CadError::Kernel`] when the body itself cannot be built, and
 /// [`CadError::Cancelled`]. A part that fails its checks is no error but has `valid == false`.
 pub fn build(
+    brep: &Brep,
+    bodies: &[NonDesignBody],
+    options: &CadOptions,
+    monitor: &Monitor,
+) -> Result<CadSolid, CadError> {
+    build_with(&kernel, brep, bodies, options, monitor)
+}
+
+/// [`build`] with booleans by `kernel`.
+pub(super) fn build_with(
+    kernel: &Kernel<'_>,
     brep: &Brep,
     bodies: &[NonDesignBody],
     options: &CadOptions,
@@ -119,27 +131,24 @@ pub fn build(
         .iter()
         .map(|bores| tool(bores))
         .collect::<Result<_, _>>()?;
-    let probes = reference::probes(brep, bodies, &tools, options.rays, monitor)?;
-    let reference = brep.volume
-        + probes
-            .iter()
-            .map(|p| p.part_volume - p.organic_volume)
-            .sum::<f64>();
+    let still = Expected::new(brep, bodies, &tools, options, monitor)?;
     let inputs = Inputs {
         bosses: disjoint(bodies.iter().map(|b| &b.boss), options)?,
         tools: disjoint(tools.iter().flatten(), options)?,
+        kernel,
     };
-    let context = inspect::Context {
-        bodies,
-        options,
-        probes: &probes,
-        reference,
-    };
-
     let mut split_body = None;
     let mut best: Option<CadSolid> = None;
     for attempt in ATTEMPTS {
         monitor.step(STAGE, attempt.text, 0.3)?;
+        let shifted;
+        let context = if attempt.shift {
+            let moved = moved(brep, shift(options));
+            shifted = Expected::new(&moved, bodies, &tools, options, monitor)?;
+            shifted.context(bodies, options)
+        } else {
+            still.context(bodies, options)
+        };
         let body = match (&mut split_body, attempt.split) {
             (_, false) => &body,
             (Some(split), true) => split,
@@ -196,7 +205,61 @@ pub fn build(
         sources,
         checked: None,
     };
-    inspect::report(made, messages, false, &context, monitor)
+    inspect::report(
+        made,
+        messages,
+        false,
+        &still.context(bodies, options),
+        monitor,
+    )
+}
+
+/// Volumes that the union must have.
+struct Expected {
+    probes: Vec<Probe>,
+    /// Of the whole part, mm3.
+    reference: f64,
+}
+
+impl Expected {
+    fn new(
+        brep: &Brep,
+        bodies: &[NonDesignBody],
+        tools: &[Option<Shape>],
+        options: &CadOptions,
+        monitor: &Monitor,
+    ) -> Result<Self, CadError> {
+        let probes = reference::probes(brep, bodies, tools, options.rays, monitor)?;
+        let change = |p: &Probe| p.part_volume - p.organic_volume;
+        let reference = brep.volume + probes.iter().map(change).sum::<f64>();
+        Ok(Self { probes, reference })
+    }
+
+    fn context<'a>(
+        &'a self,
+        bodies: &'a [NonDesignBody],
+        options: &'a CadOptions,
+    ) -> inspect::Context<'a> {
+        inspect::Context {
+            bodies,
+            options,
+            probes: &self.probes,
+            reference: self.reference,
+        }
+    }
+}
+
+/// The fitted body moved by `by`.
+fn moved(brep: &Brep, by: Vec3) -> Brep {
+    let mut out = brep.clone();
+    let edges = out.edges.iter_mut().flat_map(|e| &mut e.control);
+    let faces = out.faces.iter_mut().flat_map(|f| &mut f.control);
+    out.vertices
+        .iter_mut()
+        .chain(edges)
+        .chain(faces)
+        .for_each(|p| *p += by);
+    out
 }
 
 /// How far a part is from keeping its non-design bodies: bodies not kept, then the largest distance, mm.

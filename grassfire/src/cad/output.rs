@@ -184,12 +184,29 @@ fn iges_time(iso: &str) -> String {
     }
 }
 
+/// Chords that are tried when the kernel cannot triangulate a face with the first, as multiples of it.
+const CHORDS: [f64; 5] = [1.0, 0.6, 0.3, 1.5, 2.5];
+
 /// Triangles within `chord` mm of the part, watertight. Tags: 0 for the fitted body, 1 + index for a non-design body.
 ///
+/// Where the kernel cannot triangulate a face with that chord, finer ones are tried, then ones up to 2.5 times as coarse.
+///
 /// # Errors
-/// [`CadError::Kernel`] when a face cannot be triangulated.
+/// [`CadError::Kernel`] when a face cannot be triangulated with any of them.
 pub fn tessellate(solid: &CadSolid, chord: f64) -> Result<TriMesh, CadError> {
-    let mesh = solid.shape.tessellate(chord, FACET)?;
+    // Of a copy: triangles that an earlier try has left stay otherwise.
+    let of = |factor: &f64| {
+        let copy = solid.shape.translated([0.0; 3])?;
+        copy.tessellate(chord * factor, FACET)
+    };
+    let mut mesh = of(&CHORDS[0]);
+    for factor in &CHORDS[1..] {
+        if mesh.is_ok() {
+            break;
+        }
+        mesh = of(factor).or(mesh);
+    }
+    let mesh = mesh?;
     let tag = |f: &u32| match solid.sources.get(*f as usize) {
         Some(FaceSource::Body(i) | FaceSource::Bore(i, _)) => i + 1,
         _ => 0,

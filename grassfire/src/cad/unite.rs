@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::build::{Body, IDENTITY, VOLUME_EPS, single};
 use super::reference::{self, Probe};
-use super::{array, inspect};
+use super::{CadOptions, array, inspect};
 use crate::Vec3;
 use crate::monitor::Monitor;
 
@@ -20,10 +20,32 @@ const COARSE_MESH: [f64; 2] = [0.05, 0.35];
 /// Largest accepted share of a body's region that is missing or too much in that triangulation.
 const REGION_TOLERANCE: f64 = 0.01;
 
-/// What is added and what is cut.
-pub(super) struct Inputs {
+/// Makes one boolean; what the gate is there to distrust. Takes what [`Shape::boolean`] takes.
+pub(super) type Kernel<'a> = dyn Fn(
+        &Shape,
+        Operation,
+        &Shape,
+        f64,
+        &(dyn Fn() -> bool + Sync),
+    ) -> Result<BooleanResult, OcctError>
+    + 'a;
+
+/// The kernel's own boolean, with the common part.
+pub(super) fn kernel(
+    object: &Shape,
+    operation: Operation,
+    tool: &Shape,
+    fuzzy: f64,
+    interrupt: &(dyn Fn() -> bool + Sync),
+) -> Result<BooleanResult, OcctError> {
+    object.boolean(operation, tool, fuzzy, true, interrupt)
+}
+
+/// What is added and what is cut, and by what.
+pub(super) struct Inputs<'a> {
     pub(super) bosses: Option<Shape>,
     pub(super) tools: Option<Shape>,
+    pub(super) kernel: &'a Kernel<'a>,
 }
 
 /// What a face of a boolean's result is.
@@ -55,8 +77,14 @@ pub(super) struct Attempt {
     /// Faces near the non-design bodies are single polynomials.
     pub(super) split: bool,
     larger_fuzzy: bool,
-    shift: bool,
+    /// The fitted body is moved by [`shift`].
+    pub(super) shift: bool,
     one_by_one: bool,
+}
+
+/// The small move of the fitted body, along no axis, mm.
+pub(super) fn shift(options: &CadOptions) -> Vec3 {
+    Vec3::new(0.6, 0.48, 0.64) * options.shift
 }
 
 const PLAIN: Attempt = Attempt {
@@ -71,8 +99,14 @@ const SPLIT: Attempt = Attempt {
     split: true,
     ..PLAIN
 };
-pub(super) const ATTEMPTS: [Attempt; 5] = [
+/// The ways to make the union, in the order in which they are tried.
+pub(super) const ATTEMPTS: [Attempt; 6] = [
     PLAIN,
+    Attempt {
+        text: "union with a larger fuzzy value",
+        larger_fuzzy: true,
+        ..PLAIN
+    },
     SPLIT,
     Attempt {
         text: "union with smaller faces and a larger fuzzy value",
@@ -111,8 +145,10 @@ impl Attempt {
         if !self.shift {
             return unite(body, inputs, fuzzy, self.one_by_one, context, monitor);
         }
-        let by = Vec3::new(0.6, 0.48, 0.64) * options.shift;
-        let shape = body.shape.translated(array(by)).map_err(|e| e.0)?;
+        let shape = body
+            .shape
+            .translated(array(shift(options)))
+            .map_err(|e| e.0)?;
         unite(
             &Body {
                 shape,
@@ -132,6 +168,7 @@ impl Attempt {
 /// Running result of the booleans.
 struct Progress<'a> {
     body: &'a Body,
+    kernel: &'a Kernel<'a>,
     shape: Shape,
     kinds: Vec<Kind>,
     common: f64,
@@ -151,9 +188,7 @@ impl Progress<'_> {
             common,
             warnings,
             origins,
-        } = self
-            .shape
-            .boolean(operation, tool, self.fuzzy, true, self.interrupt)
+        } = (self.kernel)(&self.shape, operation, tool, self.fuzzy, self.interrupt)
             .map_err(|e| e.0)?;
         if let Some(first) = warnings.first() {
             return Err(format!(
@@ -191,6 +226,7 @@ fn unite(
     let faces = body.shape.counts().map_err(text)?.faces as usize;
     let mut at = Progress {
         body,
+        kernel: inputs.kernel,
         shape: body.shape.share().map_err(text)?,
         kinds: vec![Kind::Organic; faces],
         common: 0.0,
@@ -334,72 +370,5 @@ fn regions(shape: &Shape, kinds: &[Kind], context: &inspect::Context) -> Result<
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::cad::{CadOptions, NonDesignOptions, from_mesh};
-    use crate::mesh::TriMesh;
-    use crate::spline::Brep;
-
-    /// A square tube about z as a mesh: outside 10 x 10 x 8 mm, inside 6 x 6.
-    fn tube() -> TriMesh {
-        let mut mesh = TriMesh::default();
-        for corner in [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]] {
-            for (half, z) in [(5.0, 0.0), (5.0, 8.0), (3.0, 8.0), (3.0, 0.0)] {
-                mesh.points
-                    .push(Vec3::new(corner[0] * half, corner[1] * half, z));
-            }
-        }
-        for k in 0..4u32 {
-            for j in 0..4 {
-                let next = (k + 1) % 4;
-                let (a, b, c, d) = (
-                    4 * k + j,
-                    4 * next + j,
-                    4 * next + (j + 1) % 4,
-                    4 * k + (j + 1) % 4,
-                );
-                mesh.triangles.extend([[a, b, c], [a, c, d]]);
-            }
-        }
-        mesh
-    }
-
-    /// A solid that BRepCheck likes but from which a piece is missing, as silently wrong booleans make it.
-    #[test]
-    fn missing_piece_of_a_valid_solid_is_caught() -> Result<(), Box<dyn std::error::Error>> {
-        let monitor = Monitor::default();
-        let bodies = from_mesh(
-            "tube",
-            "test",
-            &tube(),
-            &NonDesignOptions::default(),
-            &monitor,
-        )?;
-        let options = CadOptions::default();
-        let probes = reference::probes(&Brep::default(), &bodies, &[None], options.rays, &monitor)?;
-        assert!(
-            (probes[0].part_volume - 512.0).abs() < 0.5,
-            "{}",
-            probes[0].part_volume
-        );
-        let context = inspect::Context {
-            bodies: &bodies,
-            options: &options,
-            probes: &probes,
-            reference: probes[0].part_volume,
-        };
-        let right = bodies[0].solid.share()?;
-        let kinds = |shape: &Shape| shape.counts().map(|c| vec![Kind::Boss; c.faces as usize]);
-        assert_eq!(volumes(512.0, 512.0, [0.0; 2], &context), Ok(()));
-        assert_eq!(regions(&right, &kinds(&right)?, &context), Ok(()));
-        let piece = Shape::cuboid([3.5, -2.0, 1.0], [9.0, 1.0, 3.0])?;
-        let wrong = right
-            .boolean(Operation::Cut, &piece, 1e-5, false, &|| false)?
-            .shape;
-        assert!(gates(&wrong, 1, &context).is_ok());
-        assert!(volumes(503.0, 503.0, [0.0; 2], &context).is_err_and(|e| e.contains("rays")));
-        assert!(volumes(512.0, 503.0, [0.0; 2], &context).is_err_and(|e| e.contains("inclusion")));
-        assert!(regions(&wrong, &kinds(&wrong)?, &context).is_err_and(|e| e.contains("tube")));
-        Ok(())
-    }
-}
+#[path = "unite_tests.rs"]
+mod tests;

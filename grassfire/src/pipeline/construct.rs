@@ -3,6 +3,7 @@
 use super::bodies::Bodies;
 use super::deliver::Delivery;
 use super::error::{PipelineError, StageError};
+use super::fewest::fewest;
 use super::record::Record;
 use super::shape::{self, Shape};
 use super::union::{self, Part};
@@ -200,6 +201,8 @@ impl Site<'_> {
             options,
             monitor,
         )?;
+        let voxel = base.remeshed.field.spacing;
+        let shape = fewest(self.record, shape, voxel, options, monitor)?;
         self.record
             .stage("write", || delivery.skeleton(&shape.skeleton.skeleton))?;
         self.record

@@ -14,7 +14,8 @@ use crate::remesh::{Remeshed, wrap};
 use crate::report::Limits;
 use crate::skeleton::{self, QuadSkeleton, Skeleton, quad_skeleton};
 use crate::spline::{
-    self, Brep, ControlMesh, G1Report, SplineError, Tessellation, build_brep, patches, tessellate,
+    self, Brep, ControlMesh, CurvatureJump, G1Report, SplineError, Tessellation, build_brep,
+    patches, tessellate,
 };
 use crate::thicken::{self, ThickenedBody, thicken};
 use crate::voxel::VoxelGrid;
@@ -43,11 +44,14 @@ pub(super) struct Shape {
     pub(super) fitted: Fitted,
     /// The body does not come from the skeleton but is wrapped around the proposal.
     pub(super) wrapped: bool,
+    /// How far the surface moved for the sake of fewer faces, mm; none when that was not asked for.
+    pub(super) faces_deviation: Option<f64>,
 }
 
 /// The smooth surface of the body.
 pub(super) struct Surface {
     pub(super) g1: G1Report,
+    pub(super) curvature: CurvatureJump,
     pub(super) brep: Brep,
     pub(super) tessellation: Tessellation,
 }
@@ -198,6 +202,7 @@ impl Workshop<'_> {
             body,
             fitted,
             wrapped,
+            faces_deviation: None,
         };
         Ok((score, shape))
     }
@@ -321,6 +326,7 @@ pub(super) fn surface(
 ) -> Result<Surface, SplineError> {
     let patches = patches(mesh, &options.patches, monitor)?;
     let g1 = spline::g1_max(mesh, &patches)?;
+    let curvature = spline::curvature_jump(mesh, &patches)?;
     let brep = build_brep(mesh, &patches, &options.brep, monitor)?;
     // A tenth of a voxel is well below what any figure of the report resolves.
     let mut fine = options.tessellate;
@@ -328,6 +334,7 @@ pub(super) fn surface(
     let tessellation = tessellate(mesh, &patches, &fine)?;
     Ok(Surface {
         g1,
+        curvature,
         brep,
         tessellation,
     })

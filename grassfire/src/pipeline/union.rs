@@ -110,9 +110,11 @@ pub(super) fn united(
         area: solid.area,
         genus: solid.genus,
         g1_max: surface.g1.max_angle_deg.max(solid.g1_max),
+        curvature_jump: (&surface.curvature).into(),
         shortest_edge: solid.shortest_edge,
         max_tolerance: solid.max_tolerance,
         volume_check: solid.volume_check,
+        faces_deviation: None,
     };
     let triangles = cad::tessellate(&solid, CHORD * voxel)?;
     let non_design_max = solid
@@ -183,10 +185,10 @@ pub(super) fn united(
     _options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Part, StageError> {
-    let kink = surface.g1.max_angle_deg;
+    let (kink, jump) = (surface.g1.max_angle_deg, surface.curvature.max);
     monitor.warn(
         "cad",
-        format!("this build has no OpenCASCADE: body.obj, body.stl and part.stl are written (largest kink {kink:.1e} degrees), no STEP"),
+        format!("this build has no OpenCASCADE: body.obj, body.stl and part.stl are written (largest kink {kink:.1e} degrees, largest jump of curvature {jump:.2} 1/mm), no STEP"),
     );
     let mesh = TriMesh {
         tags: Vec::new(),
@@ -200,3 +202,7 @@ pub(super) fn united(
         non_design: Vec::new(),
     })
 }
+
+#[cfg(all(test, feature = "occt"))]
+#[path = "union_tests.rs"]
+mod tests;

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::Check;
 use crate::monitor::Warning;
 use crate::remesh::{ChangeKind, TopologyChange};
+use crate::spline::CurvatureJump;
 use crate::topology::{Betti, SurfaceTopology};
 
 /// Everything that a run reports.
@@ -256,12 +257,47 @@ pub struct SolidBlock {
     pub genus: i64,
     /// Largest normal angle across edges meant to be smooth, degrees.
     pub g1_max: f64,
+    /// Jump of curvature across the edges around extraordinary points, before the union.
+    pub curvature_jump: CurvatureBlock,
     /// Shortest edge, mm.
     pub shortest_edge: f64,
     /// Largest tolerance of the CAD model, mm.
     pub max_tolerance: f64,
     /// Relative difference between the CAD kernel's volume and ours.
     pub volume_check: f64,
+    /// How far the surface moved for the sake of fewer faces (`brep.faces = fewest`), mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub faces_deviation: Option<f64>,
+}
+
+/// Jump of the normal curvature across the edges of all faces around extraordinary points.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct CurvatureBlock {
+    /// Largest, 1/mm.
+    pub max: f64,
+    /// Where, mm.
+    pub place: [f64; 3],
+    /// 95 % are smaller, 1/mm.
+    pub p95: f64,
+    /// Root mean square, 1/mm.
+    pub rms: f64,
+    /// `rms` over the root mean square of the curvature there.
+    pub relative: f64,
+    /// Edges measured.
+    pub edges: usize,
+}
+
+impl From<&CurvatureJump> for CurvatureBlock {
+    fn from(jump: &CurvatureJump) -> Self {
+        Self {
+            max: jump.max,
+            place: jump.place.into(),
+            p95: jump.p95,
+            rms: jump.rms,
+            relative: jump.relative,
+            edges: jump.edges,
+        }
+    }
 }
 
 /// Two-sided distance between the solid and the remeshed proposal, non-design regions left out, mm.

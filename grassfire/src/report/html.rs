@@ -316,6 +316,7 @@ fn solid(block: &SolidBlock) -> Markup {
             ("Surface", with_unit(block.area, 6, "mm²")),
             ("Genus", count(block.genus)),
             ("Largest kink across smooth edges", with_unit(block.g1_max, 3, "°")),
+            ("Jump of curvature, largest", with_unit(block.curvature_jump.max, 2, "1/mm")),
             ("Shortest edge", with_unit(block.shortest_edge, 3, "mm")),
             ("Largest tolerance", with_unit(block.max_tolerance, 3, "mm")),
             ("Volume by the CAD kernel against ours, relative", number(block.volume_check, 3)),

@@ -15,9 +15,12 @@ use crate::monitor::Monitor;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FaceMode {
-    /// Rectangular blocks of many quads: few faces.
+    /// Rectangular blocks of many quads, as few as there are without changing the surface.
     #[default]
-    Blocks,
+    Exact,
+    /// The same on a coarser control mesh, which is fitted again: fewer faces, and the surface moves a little.
+    /// [`build_brep`] itself treats it as `exact`.
+    Fewest,
     /// One face a quad: many faces, sometimes easier for the booleans of a CAD kernel.
     Quads,
 }
@@ -28,6 +31,8 @@ pub enum FaceMode {
 pub struct BrepOptions {
     /// How quads are put together to faces.
     pub faces: FaceMode,
+    /// How far `fewest` may move the surface, mm; half a voxel when not given.
+    pub tolerance: Option<f64>,
 }
 
 /// Puts the patches together to a boundary representation.
@@ -61,7 +66,7 @@ pub fn build_brep(
     }
     monitor.step(STAGE, "blocks", 0.0)?;
     let (blocks, cut) = match options.faces {
-        FaceMode::Blocks => {
+        FaceMode::Exact | FaceMode::Fewest => {
             let mut cut = cut_lines(&half_edges);
             (rectangular_blocks(mesh, &half_edges, &mut cut)?, cut)
         }

@@ -1,5 +1,6 @@
 //! What can be wrong with a control mesh.
 
+use super::catmull_clark::CatmullClarkError;
 use crate::monitor::Cancelled;
 
 /// Why a control mesh has no smooth closed surface; indices name the first offender, places are in mm.
@@ -142,6 +143,9 @@ pub enum SplineError {
         /// V - E + F of the control mesh.
         expected: i64,
     },
+    /// The control mesh cannot be subdivided.
+    #[error(transparent)]
+    Subdivision(#[from] CatmullClarkError),
     /// Stopped by the user.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -170,6 +174,7 @@ impl SplineError {
             | Self::NotSmooth { .. }
             | Self::Inconsistent { .. }
             | Self::Euler { .. } => "build one face a quad: faces = \"quads\"",
+            Self::Subdivision(inner) => return inner.hint(),
             Self::Cancelled(_) => return None,
         };
         Some(text.to_owned())

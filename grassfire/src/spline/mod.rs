@@ -3,7 +3,9 @@
 mod bezier;
 mod blocks;
 mod brep;
+mod coarsen;
 mod corner;
+mod curvature;
 mod error;
 mod gauss;
 pub(crate) mod half_edges;
@@ -12,15 +14,21 @@ mod measure;
 mod motorcycle;
 mod patches;
 mod quality;
+mod refit;
+mod removal;
 mod stencils;
+
 mod tessellate;
 
 pub use bezier::{SurfacePoint, evaluate};
 pub use brep::{BrepOptions, FaceMode, build_brep};
+pub use coarsen::{Coarse, coarsen};
+pub use curvature::{CurvatureJump, curvature_jump};
 pub use error::SplineError;
 pub use measure::{area, volume};
 pub use patches::{PatchOptions, patches};
 pub use quality::{G1Report, Jacobian, g1_max, jacobians};
+pub use removal::{CoarserStep, take_quads_out};
 pub use tessellate::{SurfaceSample, TessellateOptions, Tessellation, tessellate};
 pub mod catmull_clark;
 

@@ -17,7 +17,10 @@ fn brep(mesh: &ControlMesh, faces: FaceMode) -> Brep {
     build_brep(
         mesh,
         &build(mesh),
-        &BrepOptions { faces },
+        &BrepOptions {
+            faces,
+            ..BrepOptions::default()
+        },
         &Monitor::default(),
     )
     .expect("a valid mesh")
@@ -214,7 +217,7 @@ fn shapes_give_valid_faces() {
         let quads = brep(&mesh, FaceMode::Quads);
         assert_eq!(quads.faces.len(), mesh.quads.len());
         assert_valid(name, &mesh, &quads);
-        let blocks = brep(&mesh, FaceMode::Blocks);
+        let blocks = brep(&mesh, FaceMode::Exact);
         assert_valid(name, &mesh, &blocks);
         assert_eq!(blocks.volume, volume(&build(&mesh)));
         println!(
@@ -227,20 +230,17 @@ fn shapes_give_valid_faces() {
 
 #[test]
 fn simple_shapes_have_known_numbers_of_faces() {
-    let count = |mesh: &ControlMesh| brep(mesh, FaceMode::Blocks).faces.len();
+    let count = |mesh: &ControlMesh| brep(mesh, FaceMode::Exact).faces.len();
     assert_eq!(count(&shapes::block(1)), 6);
     assert_eq!(count(&shapes::block(4)), 6);
     assert_eq!(count(&shapes::torus(12, 8)), 4);
-    assert_eq!(
-        brep(&shapes::two_bodies(), FaceMode::Blocks).shells.len(),
-        2
-    );
+    assert_eq!(brep(&shapes::two_bodies(), FaceMode::Exact).shells.len(), 2);
 }
 
 #[test]
 fn real_bodies_give_valid_faces() {
     for (name, mesh) in shapes::bodies() {
-        let blocks = brep(&mesh, FaceMode::Blocks);
+        let blocks = brep(&mesh, FaceMode::Exact);
         assert_valid(&name, &mesh, &blocks);
         println!(
             "{name}: {} quads, {} faces, {} edges, {} vertices",
@@ -280,7 +280,7 @@ fn one_and_two_threads_give_the_same_faces() {
             .num_threads(threads)
             .build()
             .expect("threads");
-        pool.install(|| brep(&mesh, FaceMode::Blocks))
+        pool.install(|| brep(&mesh, FaceMode::Exact))
     };
     assert!(run(1) == run(2));
 }

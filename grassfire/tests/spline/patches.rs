@@ -3,8 +3,8 @@
 use grassfire::Vec3;
 use grassfire::monitor::Monitor;
 use grassfire::spline::{
-    BrepOptions, ControlMesh, Patch, PatchOptions, TessellateOptions, area, build_brep, evaluate,
-    g1_max, jacobians, patches, tessellate, volume,
+    BrepOptions, ControlMesh, Patch, PatchOptions, TessellateOptions, area, build_brep,
+    curvature_jump, evaluate, g1_max, jacobians, patches, tessellate, volume,
 };
 use proptest::prelude::*;
 
@@ -84,6 +84,28 @@ fn real_bodies_are_smooth_and_share_rows_exactly() {
             smallest_jacobian(&patches),
             area(&patches)
         );
+    }
+}
+
+#[test]
+fn curvature_jumps_only_around_extraordinary_points_and_like_one_over_the_size() {
+    let mut torus = shapes::torus(10, 7);
+    shapes::jitter(&mut torus, 0.2, 3);
+    let none = curvature_jump(&torus, &build(&torus)).expect("a valid mesh");
+    assert!(none.edges == 0 && none.max == 0.0 && none.relative == 0.0);
+    for (name, mut mesh) in [("bracket", shapes::bracket()), ("plus", shapes::plus())] {
+        shapes::jitter(&mut mesh, 0.05, 11);
+        let small = curvature_jump(&mesh, &build(&mesh)).expect("a valid mesh");
+        assert!(
+            small.edges > 0 && small.max.is_finite(),
+            "{name}: {small:?}"
+        );
+        assert!(small.rms <= small.max && small.p95 <= small.max);
+        mesh.points.iter_mut().for_each(|p| *p *= 10.0);
+        let large = curvature_jump(&mesh, &build(&mesh)).expect("a valid mesh");
+        assert!((10.0 * large.max - small.max).abs() < 1e-6 * small.max);
+        assert!((large.relative - small.relative).abs() < 1e-6);
+        assert_eq!(large.edges, small.edges);
     }
 }
 

@@ -1,0 +1,92 @@
+//! What becomes of a part whose non-design bodies cannot be united with it.
+
+use super::*;
+use crate::Vec3;
+use crate::cad::NonDesignOptions;
+use crate::cad::from_mesh;
+use crate::pipeline::shape::surface;
+use crate::spline::ControlMesh;
+
+/// Corners of the faces of a cuboid (bit d of a corner: high in direction d), counter-clockwise from outside.
+const CUBOID: [[u32; 4]; 6] = [
+    [0, 2, 3, 1],
+    [4, 5, 7, 6],
+    [0, 1, 5, 4],
+    [2, 6, 7, 3],
+    [0, 4, 6, 2],
+    [1, 3, 7, 5],
+];
+
+fn corners(low: Vec3, high: Vec3) -> Vec<Vec3> {
+    let corner = |k: usize| Vec3::from_fn(|d, _| if k >> d & 1 == 1 { high[d] } else { low[d] });
+    (0..8).map(corner).collect()
+}
+
+/// A round body about the origin, some 30 mm across, and a cuboid with its low corner at `x`.
+fn body_and_cuboid(x: f64) -> Result<(Surface, Bodies), Box<dyn std::error::Error>> {
+    let mesh = ControlMesh {
+        points: corners(Vec3::repeat(-20.0), Vec3::repeat(20.0)),
+        quads: CUBOID.to_vec(),
+    };
+    let monitor = Monitor::default();
+    let surface = surface(&mesh, 1.0, &ReconstructOptions::default(), &monitor)?;
+    let low = Vec3::new(x, -4.0, -4.0);
+    let cuboid = TriMesh {
+        points: corners(low, low + Vec3::repeat(8.0)),
+        triangles: CUBOID
+            .iter()
+            .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
+            .collect(),
+        tags: Vec::new(),
+    };
+    let options = NonDesignOptions::default();
+    let solids = from_mesh("pad", "test", &cuboid, &options, &monitor)?;
+    let mut bodies = Bodies::default();
+    bodies.add(solids)?;
+    Ok((surface, bodies))
+}
+
+fn unite(
+    x: f64,
+    recognised: bool,
+) -> Result<(Part, Bodies, Vec<String>), Box<dyn std::error::Error>> {
+    let (surface, mut bodies) = body_and_cuboid(x)?;
+    bodies.recognised = recognised;
+    let monitor = Monitor::default();
+    let options = ReconstructOptions::default();
+    let part = part(&surface, &mut bodies, 0, 1.0, &options, &monitor)?;
+    let warnings = monitor.warnings().into_iter().map(|w| w.text).collect();
+    Ok((part, bodies, warnings))
+}
+
+#[test]
+fn recognised_body_that_fits_is_united() -> Result<(), Box<dyn std::error::Error>> {
+    let (part, bodies, warnings) = unite(8.0, true)?;
+    assert!(part.solid.valid && part.solid.bodies == 1, "{warnings:?}");
+    assert!(part.non_design.len() == 1 && bodies.solids.len() == 1);
+    Ok(())
+}
+
+#[test]
+fn recognised_body_that_cannot_be_united_is_left_out() -> Result<(), Box<dyn std::error::Error>> {
+    let (part, bodies, warnings) = unite(40.0, true)?;
+    assert!(part.solid.valid && part.solid.bodies == 1, "{warnings:?}");
+    assert!(part.non_design.is_empty() && part.non_design_max.is_none());
+    assert!(bodies.solids.is_empty() && bodies.surface.triangles.is_empty());
+    let told = |text: &String| text.contains("left out") && text.contains("does not overlap");
+    assert!(warnings.iter().any(told), "{warnings:?}");
+    Ok(())
+}
+
+#[test]
+fn given_body_that_cannot_be_united_stays_and_the_part_is_not_valid()
+-> Result<(), Box<dyn std::error::Error>> {
+    let (part, bodies, warnings) = unite(40.0, false)?;
+    assert!(!part.solid.valid && part.solid.bodies == 2);
+    assert!(part.non_design.len() == 1 && bodies.solids.len() == 1);
+    assert!(
+        warnings.iter().any(|w| w.contains("does not overlap")),
+        "{warnings:?}"
+    );
+    Ok(())
+}
