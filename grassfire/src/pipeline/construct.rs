@@ -5,7 +5,7 @@ use super::deliver::Delivery;
 use super::error::{PipelineError, StageError};
 use super::fewest::fewest;
 use super::record::Record;
-use super::shape::{self, Shape};
+use super::shape::{self, Base, Shape};
 use super::union::{self, Part};
 use super::{ReconstructOptions, measure};
 use crate::fit::clear_of;
@@ -14,7 +14,6 @@ use crate::monitor::Monitor;
 use crate::remesh::{DesignPart, Remeshed, cut_out};
 use crate::skeleton::Skeleton;
 use crate::topology::Betti;
-use crate::voxel::VoxelGrid;
 
 /// What every way of making the part starts from.
 pub(super) struct Site<'a> {
@@ -35,15 +34,6 @@ pub(super) struct Made {
     pub(super) part: Part,
 }
 
-/// What is made into a body: the design part or the whole proposal.
-struct Base<'a> {
-    remeshed: &'a Remeshed,
-    /// The field that the body is fitted to.
-    target: &'a VoxelGrid<f32>,
-    /// The topology of the union, when bodies were cut out.
-    united: Option<Betti>,
-}
-
 impl Site<'_> {
     /// Makes the part.
     ///
@@ -52,7 +42,7 @@ impl Site<'_> {
     ///    proposal is made as a whole; the body ends inside the walls of given bodies then. Recognised ones are left out
     ///    when no union with them is valid.
     pub(super) fn build(&mut self) -> Result<Made, PipelineError> {
-        match self.from_design_part() {
+        match self.without_bodies() {
             Ok(Some(made)) => return Ok(made),
             Ok(None) => {}
             Err(error) if error.is_cancelled() => return Err(error),
@@ -68,7 +58,7 @@ impl Site<'_> {
         );
     }
 
-    fn from_design_part(&mut self) -> Result<Option<Made>, PipelineError> {
+    fn without_bodies(&mut self) -> Result<Option<Made>, PipelineError> {
         let (remeshed, options, monitor) = (self.remeshed, self.options, self.monitor);
         if !options.non_design.cut_out {
             return Ok(None);
@@ -190,17 +180,7 @@ impl Site<'_> {
             medial::medial_axis(&base.remeshed.field, &options.medial, monitor)
         })?;
         self.record.stage("write", || delivery.medial(&axis.mesh))?;
-        let may_wrap = base.united.is_none();
-        let shape = shape::shape(
-            self.record,
-            &axis,
-            base.remeshed,
-            base.target,
-            may_wrap,
-            self.drawn,
-            options,
-            monitor,
-        )?;
+        let shape = shape::shape(self.record, &axis, base, self.drawn, options, monitor)?;
         let voxel = base.remeshed.field.spacing;
         let shape = fewest(self.record, shape, voxel, options, monitor)?;
         self.record

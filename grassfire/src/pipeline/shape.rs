@@ -18,6 +18,7 @@ use crate::spline::{
     patches, tessellate,
 };
 use crate::thicken::{self, ThickenedBody, thicken};
+use crate::topology::Betti;
 use crate::voxel::VoxelGrid;
 
 /// When to try again with another quad size, and with which.
@@ -56,27 +57,33 @@ pub(super) struct Surface {
     pub(super) tessellation: Tessellation,
 }
 
+/// What is made into a body: the design part or the whole proposal.
+pub(super) struct Base<'a> {
+    pub(super) remeshed: &'a Remeshed,
+    /// The field that bodies are fitted to.
+    pub(super) target: &'a VoxelGrid<f32>,
+    /// The topology of the union, when non-design bodies were cut out.
+    pub(super) united: Option<Betti>,
+}
+
 /// What every try starts from.
 struct Workshop<'a> {
     record: &'a mut Record,
     axis: &'a MedialAxis,
-    remeshed: &'a Remeshed,
-    /// The field that bodies are fitted to.
-    target: &'a VoxelGrid<f32>,
+    base: &'a Base<'a>,
     /// A skeleton drawn elsewhere.
     drawn: Option<&'a Skeleton>,
     options: &'a ReconstructOptions,
     monitor: &'a Monitor,
 }
 
-/// Skeleton, thickening and fit to `target`; the first body that is sound and close enough wins, else the best of all
-/// tries. When none is sound, or all are far off, and `may_wrap`, the body is wrapped around the proposal instead.
+/// Skeleton, thickening and fit; the first body that is sound and close enough wins, else the best of all tries. When
+/// none is sound, or all are far off, the body is wrapped around the proposal instead, but never around a design part:
+/// there the whole proposal is tried before.
 pub(super) fn shape(
     record: &mut Record,
     axis: &MedialAxis,
-    remeshed: &Remeshed,
-    target: &VoxelGrid<f32>,
-    may_wrap: bool,
+    base: &Base,
     drawn: Option<&Skeleton>,
     options: &ReconstructOptions,
     monitor: &Monitor,
@@ -84,8 +91,7 @@ pub(super) fn shape(
     let mut workshop = Workshop {
         record,
         axis,
-        remeshed,
-        target,
+        base,
         drawn,
         options,
         monitor,
@@ -95,7 +101,7 @@ pub(super) fn shape(
         Ok((score, _)) => score.usable(),
         Err(error) => error.is_cancelled() || options.retry.quad_sizes.is_empty(),
     };
-    if finished || drawn.is_some() || !may_wrap {
+    if finished || drawn.is_some() || base.united.is_some() {
         return tried.map(|(_, shape)| shape);
     }
     let first = tried.as_ref().ok().map(|(_, shape)| shape.skeleton.clone());
@@ -174,7 +180,7 @@ impl Workshop<'_> {
             Some(skeleton) => skeleton,
             None => self.skeleton(1.0)?,
         };
-        let (field, solid) = (&self.remeshed.field, self.axis.solid);
+        let (field, solid) = (&self.base.remeshed.field, self.axis.solid);
         let (options, monitor) = (&self.options.wrap, self.monitor);
         let mesh = self
             .record
@@ -192,7 +198,7 @@ impl Workshop<'_> {
         body: ThickenedBody,
         wrapped: bool,
     ) -> Result<(Score, Shape), PipelineError> {
-        let (field, options) = (self.target, &self.options.fit);
+        let (field, options) = (self.base.target, &self.options.fit);
         let fitted = self.record.stage("fit", || {
             fit(&body, &skeleton.skeleton, field, options, self.monitor)
         })?;
@@ -214,7 +220,7 @@ impl Workshop<'_> {
         sized.size_least *= size;
         sized.size_most *= size;
         sized.quad_size = sized.quad_size.map(|mm| mm * size);
-        let (axis, voxel) = (self.axis, self.remeshed.field.spacing);
+        let (axis, voxel) = (self.axis, self.base.remeshed.field.spacing);
         let (drawn, monitor) = (self.drawn, self.monitor);
         let mut skeleton = self.record.stage("skeleton", || match drawn {
             Some(drawn) => Ok(adopt(drawn, axis)),
