@@ -132,8 +132,8 @@ impl Workshop<'_> {
             source: StageError::NoQuadSize,
         });
         for (attempt, &size) in sizes.iter().enumerate() {
-            // Coarser quads may get rid of crossings, but never of distance.
-            if size > 1.0 && best.as_ref().is_ok_and(|(score, _)| score.sound()) {
+            let sound = best.as_ref().map(|(score, _)| score.sound());
+            if !worth_trying(size, sound.ok(), self.base.united.is_some()) {
                 continue;
             }
             let name = format!("try {} (quad size x {size})", attempt + 1);
@@ -231,6 +231,21 @@ impl Workshop<'_> {
         Ok(skeleton)
     }
 }
+
+/// Whether a body with quads of `size` may be better than the best so far, which is `sound` or is none.
+///
+/// Coarser quads may get rid of crossings, but never of distance; much finer ones the other way round. Of a design part
+/// that cuts itself in two tries the whole proposal is the better next try.
+fn worth_trying(size: f64, sound: Option<bool>, design_part: bool) -> bool {
+    match sound {
+        Some(true) => size <= 1.0,
+        Some(false) => size >= FINE && !(design_part && size > 1.0),
+        None => true,
+    }
+}
+
+/// Quads below this multiple of the usual size are much finer.
+const FINE: f64 = 0.75;
 
 /// How good a fitted body is.
 struct Score {
@@ -344,4 +359,17 @@ pub(super) fn surface(
         brep,
         tessellation,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finer_quads_are_for_distance_and_coarser_ones_for_crossings() {
+        assert!(worth_trying(1.0, None, false) && worth_trying(0.6, None, true));
+        assert!(worth_trying(0.6, Some(true), true) && !worth_trying(1.3, Some(true), false));
+        assert!(worth_trying(1.3, Some(false), false) && !worth_trying(0.6, Some(false), false));
+        assert!(worth_trying(0.8, Some(false), true) && !worth_trying(1.3, Some(false), true));
+    }
 }
