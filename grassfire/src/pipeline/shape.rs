@@ -141,7 +141,8 @@ impl Workshop<'_> {
                 Ok((score, shape)) if score.good() => return Ok((score, shape)),
                 Ok((score, shape)) => {
                     self.monitor.warn("fit", format!("{name}: {score}"));
-                    let hopeless = score.hopeless();
+                    let hopeless =
+                        score.hopeless() || self.base.united.is_some() && score.crossings > MANY;
                     let least = best.as_ref().ok();
                     if least.is_none_or(|(least, _)| score.worse() < least.worse()) {
                         best = Ok((score, shape));
@@ -243,6 +244,9 @@ fn worth_trying(size: f64, sound: Option<bool>, design_part: bool) -> bool {
         None => true,
     }
 }
+
+/// A design part that cuts itself at more places than this gets no other try: the whole proposal is the better one.
+const MANY: usize = 3;
 
 /// Quads below this multiple of the usual size are much finer.
 const FINE: f64 = 0.75;
