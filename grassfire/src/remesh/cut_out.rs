@@ -5,9 +5,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::digital::VoxelSet;
-use super::{Capsule, RemeshError, Remeshed, STAGE, compose, extract, noise};
+use super::{Capsule, RemeshError, Remeshed, STAGE, closed_surface, noise};
 use crate::Vec3;
-use crate::mesh::{Bvh, Solid, TriMesh, Winding};
+use crate::mesh::{Bvh, TriMesh, Winding};
 use crate::monitor::Monitor;
 use crate::topology::Betti;
 use crate::voxel::VoxelGrid;
@@ -135,21 +135,19 @@ pub fn cut_out(
     let opened = near.opened(&cut, &lengths);
     let mut joined = near.joined(&whole, &opened, &lengths);
     near.refresh(&mut joined, None, monitor)?;
-    let closed = near.closed(&whole, &joined, &lengths);
+    let mut closed = near.closed(&whole, &joined, &lengths);
+    drop_crumbs(&mut closed, lengths.island);
+    let left = near.refresh(&mut closed, None, monitor)?;
+    if !left.solid.contains(&true) {
+        return Ok(None);
+    }
     let together = |field: &VoxelGrid<f32>| near.together(field, lengths.skin).betti();
     let wanted = together(&whole);
     let mut best = None;
     // Cleaning may close a tunnel that is needed: then less of it.
     for share in [1.0, 0.5, 0.25, 0.0] {
         let noise = share * lengths.noise;
-        let part = solid_of(
-            closed.clone(),
-            &near,
-            lengths.island,
-            noise,
-            proposal,
-            monitor,
-        )?;
+        let part = solid_of(closed.clone(), &near, noise, proposal, monitor)?;
         let Some(part) = part else { continue };
         let united = together(&part.field);
         let found = united == wanted;
@@ -242,7 +240,7 @@ impl Near {
     fn opened(&self, cut: &VoxelGrid<f32>, lengths: &Lengths) -> VoxelGrid<f32> {
         let h = cut.spacing;
         let radius = lengths.least_half_thickness;
-        let balls = balls(cut, radius / h + 2.0);
+        let ball = Ball::new(cut, radius / h + 2.0);
         // Farther out nothing was cut, and not all the neighbours that the balls need are known.
         let last = lengths.skin + 2.0 * radius;
         self.replaced(cut, |n, v| {
@@ -250,7 +248,7 @@ impl Near {
             if value <= 0.0 || value >= radius || self.depth(n) < -last {
                 return value;
             }
-            value.min(covered(cut, 1.0, &balls, v, radius) + FORGIVEN * h)
+            value.min(ball.covered(cut, 1.0, v, radius) + FORGIVEN * h)
         })
     }
 
@@ -263,7 +261,7 @@ impl Near {
     ) -> VoxelGrid<f32> {
         let h = opened.spacing;
         let reach = lengths.skin + lengths.run_on;
-        let balls = balls(opened, reach / h + 1.5);
+        let ball = Ball::new(opened, reach / h + 1.5);
         self.replaced(opened, |n, v| {
             let value = f64::from(opened.values[v]);
             if self.depth(n) < -lengths.skin - h || value > reach {
@@ -274,7 +272,7 @@ impl Near {
             if room <= value {
                 return value;
             }
-            let run_on = covered(opened, 1.0, &balls, v, 0.0) + reach;
+            let run_on = ball.covered(opened, 1.0, v, 0.0) + reach;
             value.max(run_on.min(room))
         })
     }
@@ -287,13 +285,13 @@ impl Near {
         lengths: &Lengths,
     ) -> VoxelGrid<f32> {
         let h = joined.spacing;
-        let balls = balls(joined, lengths.slot / h + 2.0);
+        let ball = Ball::new(joined, lengths.slot / h + 2.0);
         self.replaced(joined, |n, v| {
             let value = f64::from(joined.values[v]);
             if value >= 0.0 || -value >= lengths.slot || self.depth(n) < -lengths.skin - h {
                 return value;
             }
-            let empty = covered(joined, -1.0, &balls, v, lengths.slot) + FORGIVEN * h;
+            let empty = ball.covered(joined, -1.0, v, lengths.slot) + FORGIVEN * h;
             let room = f64::from(whole.values[v]).min(-self.free[n]);
             value.max((-empty).min(room))
         })
@@ -329,39 +327,49 @@ impl Near {
     }
 }
 
-/// Steps of index to all voxels of a ball with their lengths, mm.
-fn balls(grid: &VoxelGrid<f32>, radius: f64) -> Vec<(isize, f64)> {
-    let n = radius.ceil() as isize;
-    let [nx, ny, _] = grid.dims.map(|d| d as isize);
-    let mut out = Vec::new();
-    for k in -n..=n {
-        for j in -n..=n {
-            for i in -n..=n {
-                let length = ((i * i + j * j + k * k) as f64).sqrt();
-                if length <= radius {
-                    out.push(((k * ny + j) * nx + i, length * grid.spacing));
+/// The voxels around a voxel.
+struct Ball {
+    /// Steps of index to them with their lengths, mm.
+    steps: Vec<(isize, f64)>,
+    /// The longest of these, mm.
+    reach: f64,
+}
+
+impl Ball {
+    /// All voxels within `radius` voxels.
+    fn new(grid: &VoxelGrid<f32>, radius: f64) -> Self {
+        let n = radius.ceil() as isize;
+        let [nx, ny, _] = grid.dims.map(|d| d as isize);
+        let mut steps = Vec::new();
+        for k in -n..=n {
+            for j in -n..=n {
+                for i in -n..=n {
+                    let length = ((i * i + j * j + k * k) as f64).sqrt();
+                    if length <= radius {
+                        steps.push(((k * ny + j) * nx + i, length * grid.spacing));
+                    }
                 }
             }
         }
+        let reach = steps.iter().map(|s| s.1).fold(0.0, f64::max);
+        Self { steps, reach }
     }
-    out
-}
 
-/// How deep voxel `v` lies in the balls about the voxels around it, each as large as its value times `side`; only balls
-/// of at least `least` count. Negative outside all of them, at least the negative radius of the neighbourhood.
-fn covered(grid: &VoxelGrid<f32>, side: f64, around: &[(isize, f64)], v: usize, least: f64) -> f64 {
-    let far = around.iter().map(|s| s.1).fold(0.0, f64::max);
-    let mut best = -far;
-    for &(step, length) in around {
-        let Some(&value) = v.checked_add_signed(step).and_then(|n| grid.values.get(n)) else {
-            continue;
-        };
-        let value = side * f64::from(value);
-        if value > 0.0 && value >= least {
-            best = best.max(value - length);
+    /// How deep voxel `v` lies in the balls about the voxels around it, each as large as its value times `side`; only
+    /// balls of at least `least` count. Negative outside all of them, at least the negative reach.
+    fn covered(&self, grid: &VoxelGrid<f32>, side: f64, v: usize, least: f64) -> f64 {
+        let mut best = -self.reach;
+        for &(step, length) in &self.steps {
+            let Some(&value) = v.checked_add_signed(step).and_then(|n| grid.values.get(n)) else {
+                continue;
+            };
+            let value = side * f64::from(value);
+            if value > 0.0 && value >= least {
+                best = best.max(value - length);
+            }
         }
+        best
     }
-    best
 }
 
 /// Depth in a finite cylinder, mm, negative outside.
@@ -445,33 +453,16 @@ fn drop_crumbs(field: &mut VoxelGrid<f32>, edge: f64) {
 fn solid_of(
     mut field: VoxelGrid<f32>,
     near: &Near,
-    island: f64,
     noise: f64,
     proposal: &Remeshed,
     monitor: &Monitor,
 ) -> Result<Option<Remeshed>, RemeshError> {
-    drop_crumbs(&mut field, island);
-    if !near
-        .refresh(&mut field, None, monitor)?
-        .solid
-        .contains(&true)
-    {
-        return Ok(None);
-    }
     let cleaned = noise::remove_noise(&mut field, noise, None, &[], monitor)?;
     let mut set = near.refresh(&mut field, Some(&cleaned.touched), monitor)?;
     if !set.solid.contains(&true) {
         return Ok(None);
     }
-    compose::separate_opposite_empties(&mut field, &mut set);
-    let solid = Solid::try_from(extract::surface(&field, &set, true).mesh)?;
-    let after = set.betti();
-    if solid.euler() != 2 * after.chi {
-        return Err(RemeshError::Topology {
-            surface: solid.euler(),
-            voxels: after.chi,
-        });
-    }
+    let (solid, after) = closed_surface(&mut field, &mut set, monitor)?;
     Ok(Some(Remeshed {
         solid,
         field,

@@ -1,6 +1,8 @@
 //! Eyes on a bar, cut out.
 
+use super::super::extract;
 use super::*;
+use crate::mesh::Solid;
 
 const EYES: [f64; 2] = [-30.0, 30.0];
 const WALL: f64 = 8.0;

@@ -37,6 +37,7 @@ use serde::Serialize;
 use crate::Vec3;
 use crate::mesh::{Solid, TriMesh};
 use crate::monitor::Monitor;
+use crate::topology::Betti;
 use crate::voxel::VoxelGrid;
 use digital::VoxelSet;
 
@@ -221,29 +222,8 @@ fn remesh_on(
     if !noise.changes.is_empty() {
         noise::refresh(&mut field, &set, &noise.touched, monitor)?;
     }
-    let forced = compose::separate_opposite_empties(&mut field, &mut set);
-    if forced > 0 {
-        monitor.warn(STAGE, format!("{forced} places pinched to a point were closed or opened at random: voxel {voxel} mm is coarse for this part"));
-    }
     monitor.step(STAGE, "surface", 0.85)?;
-    let surface = extract::surface(&field, &set, true);
-    if surface.intersecting > 0 {
-        monitor.warn(
-            STAGE,
-            format!(
-                "{} vertices of the new surface belong to intersecting triangles (0 wanted)",
-                surface.intersecting
-            ),
-        );
-    }
-    let solid = Solid::try_from(surface.mesh)?;
-    let after = set.betti();
-    if solid.euler() != 2 * after.chi {
-        return Err(RemeshError::Topology {
-            surface: solid.euler(),
-            voxels: after.chi,
-        });
-    }
+    let (solid, after) = closed_surface(&mut field, &mut set, monitor)?;
     monitor.step(STAGE, "distance", 0.95)?;
     let (islands, lost) =
         islands::lost_islands(mesh, &field, width.max(2.0 * voxel), &noise.changes);
@@ -269,6 +249,39 @@ fn remesh_on(
         distance_max,
         source,
     })
+}
+
+/// The surface of a clean field, whose voxels are `set`, with the topology of both; warns of places that a finer voxel
+/// would show better.
+fn closed_surface(
+    field: &mut VoxelGrid<f32>,
+    set: &mut VoxelSet,
+    monitor: &Monitor,
+) -> Result<(Solid, Betti), RemeshError> {
+    let voxel = field.spacing;
+    let forced = compose::separate_opposite_empties(field, set);
+    if forced > 0 {
+        monitor.warn(STAGE, format!("{forced} places pinched to a point were closed or opened at random: voxel {voxel} mm is coarse for this part"));
+    }
+    let surface = extract::surface(field, set, true);
+    if surface.intersecting > 0 {
+        monitor.warn(
+            STAGE,
+            format!(
+                "{} vertices of the new surface belong to intersecting triangles (0 wanted)",
+                surface.intersecting
+            ),
+        );
+    }
+    let solid = Solid::try_from(surface.mesh)?;
+    let after = set.betti();
+    if solid.euler() != 2 * after.chi {
+        return Err(RemeshError::Topology {
+            surface: solid.euler(),
+            voxels: after.chi,
+        });
+    }
+    Ok((solid, after))
 }
 
 /// Tunnels of the input (of genus `input`) that `field` does not have, and a flag for each of their triangles; warns of
