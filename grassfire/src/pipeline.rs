@@ -176,7 +176,12 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         options,
         monitor,
     };
-    let Made { axis, shape, part } = site.build()?;
+    let Made {
+        axis,
+        shape,
+        part,
+        distance,
+    } = site.build()?;
     if part.non_design.is_empty() {
         recognise::left_out(&mut record.report.candidates);
     }
@@ -198,10 +203,8 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         files.write(monitor)
     })?;
 
-    let deviation = record.stage("measure", || {
-        measure::deviation(&remeshed, &part, &bodies, monitor)
-    })?;
-    record.report.distance = Some(measure::distance_block(&deviation, &remeshed, &part));
+    measure::name_far_places(&distance, remeshed.field.spacing, monitor);
+    record.report.distance = Some(measure::distance_block(&distance, &remeshed, &part));
     record.report.volume = Some(measure::volume_block(&remeshed, &part));
 
     let pictures = record.stage("pictures", || {

@@ -10,6 +10,7 @@ use super::union::{self, Part};
 use super::{ReconstructOptions, measure};
 use crate::fit::clear_of;
 use crate::medial::{self, MedialAxis};
+use crate::mesh::Distance;
 use crate::monitor::Monitor;
 use crate::remesh::{DesignPart, Remeshed, cut_out};
 use crate::skeleton::Skeleton;
@@ -32,6 +33,8 @@ pub(super) struct Made {
     pub(super) axis: MedialAxis,
     pub(super) shape: Shape,
     pub(super) part: Part,
+    /// From the part to the proposal and back.
+    pub(super) distance: Distance,
 }
 
 impl Site<'_> {
@@ -102,25 +105,35 @@ impl Site<'_> {
         let part = self.record.stage("cad", || {
             union::united(&surface, bodies, 0, voxel, options, monitor)
         })?;
+        part.tell(monitor);
         if let Some(problem) = part.problem(&wanted) {
             self.give_up(&problem);
             return Ok(None);
         }
-        if let Some(problem) = self.too_far(&part)? {
+        let distance = self.distance(&part)?;
+        if let Some(problem) = self.too_far(&part, &distance) {
             self.give_up(&problem);
             return Ok(None);
         }
         self.report(&axis, &shape, base.united);
-        Ok(Some(Made { axis, shape, part }))
+        Ok(Some(Made {
+            axis,
+            shape,
+            part,
+            distance,
+        }))
+    }
+
+    fn distance(&mut self, part: &Part) -> Result<Distance, PipelineError> {
+        let (remeshed, bodies, monitor) = (self.remeshed, &*self.bodies, self.monitor);
+        self.record.stage("measure", || {
+            measure::distance(remeshed, part, bodies, monitor)
+        })
     }
 
     /// By how much the part misses the limits for distance and volume, when it does.
-    fn too_far(&mut self, part: &Part) -> Result<Option<String>, PipelineError> {
-        let limits = &self.options.report.limits;
-        let (remeshed, bodies, monitor) = (self.remeshed, &*self.bodies, self.monitor);
-        let distance = self.record.stage("measure", || {
-            measure::distance_to(remeshed, part, bodies, monitor)
-        })?;
+    fn too_far(&self, part: &Part, distance: &Distance) -> Option<String> {
+        let (remeshed, limits) = (self.remeshed, &self.options.report.limits);
         let voxel = remeshed.field.spacing;
         let volume = measure::volume_block(remeshed, part)
             .relative_difference
@@ -128,14 +141,14 @@ impl Site<'_> {
         let misses = distance.rms > limits.distance_rms * voxel
             || distance.p95 > limits.distance_p95 * voxel
             || volume > limits.volume;
-        Ok(misses.then(|| {
+        misses.then(|| {
             format!(
                 "the part is {:.2} voxels (rms) from the proposal, 95 % of it within {:.2} voxels, {:.1} % off in volume",
                 distance.rms / voxel,
                 distance.p95 / voxel,
                 100.0 * volume
             )
-        }))
+        })
     }
 
     fn as_a_whole(&mut self) -> Result<Made, PipelineError> {
@@ -169,8 +182,14 @@ impl Site<'_> {
         let part = self.record.stage("cad", || {
             union::part(&surface, bodies, intersections, voxel, options, monitor)
         })?;
+        let distance = self.distance(&part)?;
         self.report(&axis, &shape, base.united);
-        Ok(Made { axis, shape, part })
+        Ok(Made {
+            axis,
+            shape,
+            part,
+            distance,
+        })
     }
 
     /// Medial axis, skeleton and fitted body, each written as it is made.

@@ -96,7 +96,7 @@ pub(super) fn body_block(shape: &Shape) -> BodyBlock {
 }
 
 /// Distance between the part and the remeshed proposal, both ways, away from the non-design region.
-pub(super) fn distance_to(
+pub(super) fn distance(
     remeshed: &Remeshed,
     part: &Part,
     bodies: &Bodies,
@@ -114,15 +114,8 @@ pub(super) fn distance_to(
     ))
 }
 
-/// As [`distance_to`], with a warning for places far off.
-pub(super) fn deviation(
-    remeshed: &Remeshed,
-    part: &Part,
-    bodies: &Bodies,
-    monitor: &Monitor,
-) -> Result<Distance, Cancelled> {
-    let voxel = remeshed.field.spacing;
-    let distance = distance_to(remeshed, part, bodies, monitor)?;
+/// Warns of places far off.
+pub(super) fn name_far_places(distance: &Distance, voxel: f64, monitor: &Monitor) {
     for (place, mm) in distance
         .worst
         .iter()
@@ -139,7 +132,6 @@ pub(super) fn deviation(
             ),
         );
     }
-    Ok(distance)
 }
 
 pub(super) fn distance_block(

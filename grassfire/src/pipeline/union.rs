@@ -36,6 +36,16 @@ pub(super) struct Part {
 pub(super) const CHORD: f64 = 0.05;
 
 impl Part {
+    /// Warns of what the union met with.
+    pub(super) fn tell(&self, monitor: &Monitor) {
+        #[cfg(feature = "occt")]
+        for message in &self.solid.messages {
+            monitor.warn("cad", message.clone());
+        }
+        #[cfg(not(feature = "occt"))]
+        let _ = monitor;
+    }
+
     /// What speaks against this part of topology `wanted`, when anything does.
     pub(super) fn problem(&self, wanted: &Betti) -> Option<String> {
         let block = self.block.as_ref()?;
@@ -52,7 +62,7 @@ impl Part {
     }
 }
 
-/// As [`united`], but recognised bodies are taken away when no union with them is valid.
+/// As [`united`], told of, but recognised bodies are taken away when no union with them is valid.
 #[cfg(feature = "occt")]
 pub(super) fn part(
     surface: &Surface,
@@ -64,6 +74,7 @@ pub(super) fn part(
 ) -> Result<Part, StageError> {
     let part = united(surface, bodies, intersections, voxel, options, monitor)?;
     if part.solid.valid || !bodies.recognised {
+        part.tell(monitor);
         return Ok(part);
     }
     monitor.warn(
@@ -75,7 +86,9 @@ pub(super) fn part(
         ),
     );
     *bodies = Bodies::default();
-    united(surface, bodies, intersections, voxel, options, monitor)
+    let part = united(surface, bodies, intersections, voxel, options, monitor)?;
+    part.tell(monitor);
+    Ok(part)
 }
 
 /// Builds the CAD solid, unites it with the non-design bodies and checks it. `intersections` is how often the fitted
@@ -90,9 +103,6 @@ pub(super) fn united(
     monitor: &Monitor,
 ) -> Result<Part, StageError> {
     let mut solid = cad::build(&surface.brep, &bodies.solids, &options.cad, monitor)?;
-    for message in &solid.messages {
-        monitor.warn("cad", message.clone());
-    }
     if intersections > 0 {
         solid.valid = false;
         monitor.warn(
