@@ -24,6 +24,8 @@ pub struct Bore {
     pub extension: [f64; 2],
 }
 
+/// Largest difference of radius and place between a bore and a face on its wall, mm.
+pub(super) const ON_WALL: f64 = 1e-6;
 /// Gap that counts as "just beyond the end", as a share of the radius.
 const PROBE: f64 = 1e-3;
 /// Share of the radius at which lines run along the wall.
@@ -33,6 +35,24 @@ impl Bore {
     /// Open at both ends.
     pub fn through(&self) -> bool {
         self.open == [true, true]
+    }
+
+    /// Where the hole begins and ends with what is kept free beyond its open ends, mm along `direction` from `origin`.
+    pub fn free_extent(&self) -> [f64; 2] {
+        let [from, to] = self.extent;
+        [from - self.extension[0], to + self.extension[1]]
+    }
+
+    /// Whether a face is its wall or a part of it.
+    pub(crate) fn is_wall(&self, face: &Face) -> bool {
+        let Surface::Cylinder {
+            concave: true,
+            radius,
+        } = face.surface
+        else {
+            return false;
+        };
+        (self.radius - radius).abs() < ON_WALL && self.distance(face.middle.into()) < ON_WALL
     }
 
     /// Distance of a point to the endless cylinder, mm.
@@ -48,10 +68,7 @@ impl Bore {
 
     /// The hole and what is kept free beyond its open ends.
     pub(crate) fn tool(&self) -> Result<Shape, OcctError> {
-        self.cylinder([
-            self.extent[0] - self.extension[0],
-            self.extent[1] + self.extension[1],
-        ])
+        self.cylinder(self.free_extent())
     }
 
     fn cylinder(&self, [from, to]: [f64; 2]) -> Result<Shape, OcctError> {
@@ -88,10 +105,8 @@ impl Bore {
     /// What is to be free of material: the wall's length and the extensions, a hair inside closed ends.
     pub(crate) fn free_range(&self) -> [f64; 2] {
         let hair = PROBE * self.radius;
-        [
-            self.extent[0] - self.extension[0] + hair,
-            self.extent[1] + self.extension[1] - hair,
-        ]
+        let [from, to] = self.free_extent();
+        [from + hair, to - hair]
     }
 }
 

@@ -1,9 +1,9 @@
 //! Everything that the report says about the finished part.
 
-use grassfire_occt::{Face, OcctError, Shape, Surface};
+use grassfire_occt::{Face, OcctError, Shape};
 use serde::Serialize;
 
-use super::bores::Bore;
+use super::bores::{Bore, ON_WALL};
 use super::build::{CadSolid, FaceSource};
 use super::non_design::NonDesignBody;
 use super::reference::Probe;
@@ -56,8 +56,6 @@ pub(crate) struct Context<'a> {
 
 /// Points on each face that decide which body it belongs to.
 const SAMPLES: usize = 8;
-/// A face no farther from a bore's cylinder than this is its wall, mm.
-const ON_WALL: f64 = 1e-6;
 
 /// Finds for each face that is not organic the body, or the bore, whose surface it lies on.
 pub(crate) fn sources(
@@ -164,16 +162,7 @@ pub(crate) fn separate_sources(
 
 /// The bore of a body whose wall a face of it is.
 fn bore_of(body: &NonDesignBody, face: &Face) -> Option<usize> {
-    let Surface::Cylinder {
-        concave: true,
-        radius,
-    } = face.surface
-    else {
-        return None;
-    };
-    body.bores.iter().position(|bore| {
-        (bore.radius - radius).abs() < ON_WALL && bore.distance(face.middle.into()) < ON_WALL
-    })
+    body.bores.iter().position(|bore| bore.is_wall(face))
 }
 
 /// Measures the part and decides whether it is valid.

@@ -207,22 +207,15 @@ pub fn read_design_space(path: &Path, chord: f64) -> Result<DesignSpace, CadErro
     };
     for solid in &solids {
         let mesh = solid.tessellate(chord, 0.2)?;
-        let (point, face) = (out.faces.points.len() as u32, out.kinds.len() as u32);
-        out.faces
-            .points
-            .extend(mesh.points.iter().map(|p| Vec3::from(*p)));
-        out.faces
-            .triangles
-            .extend(mesh.triangles.iter().map(|t| t.map(|v| v + point)));
+        let face = out.kinds.len() as u32;
+        let points = mesh.points.iter().map(|p| Vec3::from(*p));
+        out.faces.append(points, mesh.triangles);
         out.faces.tags.extend(mesh.faces.iter().map(|f| f + face));
         let own = solid.faces()?;
         out.kinds.extend(own.iter().map(|f| kind(&f.surface)));
         out.solids.push((face..out.kinds.len() as u32).collect());
         for bore in bores::find(solid)? {
-            let on = |f: &usize| {
-                matches!(own[*f].surface, Surface::Cylinder { concave: true, radius } if (radius - bore.radius).abs() < 1e-6)
-                    && bore.distance(own[*f].middle.into()) < 1e-6
-            };
+            let on = |f: &usize| bore.is_wall(&own[*f]);
             let walls = (0..own.len()).filter(on).map(|f| f as u32 + face).collect();
             out.bores.push(SpaceBore {
                 origin: bore.origin,

@@ -199,22 +199,11 @@ pub(crate) fn sweep(grid: &RayGrid, sets: &[&Columns], mut piece: impl FnMut(u12
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::shapes::cuboid;
 
     fn cube(low: f64, high: f64) -> Vec<[Vec3; 3]> {
-        let p = |k: usize| Vec3::from_fn(|d, _| if k >> d & 1 == 1 { high } else { low });
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        quads
-            .iter()
-            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-            .map(|t| t.map(p))
-            .collect()
+        let mesh = cuboid(Vec3::repeat(low), Vec3::repeat(high));
+        (0..12).map(|t| mesh.corners(t)).collect()
     }
 
     #[test]

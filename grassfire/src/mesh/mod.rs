@@ -4,6 +4,8 @@ pub mod bvh;
 pub mod distance;
 mod repair;
 pub mod self_intersection;
+#[cfg(test)]
+pub(crate) mod shapes;
 mod solid;
 pub mod winding;
 
@@ -31,6 +33,18 @@ impl TriMesh {
     #[inline]
     pub fn corners(&self, t: usize) -> [Vec3; 3] {
         self.triangles[t].map(|v| self.points[v as usize])
+    }
+
+    /// Adds points, and triangles that count from the first of these. Tags are left to the caller.
+    pub fn append(
+        &mut self,
+        points: impl IntoIterator<Item = Vec3>,
+        triangles: impl IntoIterator<Item = [u32; 3]>,
+    ) {
+        let before = self.points.len() as u32;
+        self.points.extend(points);
+        let moved = triangles.into_iter().map(|t| t.map(|v| v + before));
+        self.triangles.extend(moved);
     }
 
     /// Signed volume (positive when oriented outward), mm3. Summed about the first point to keep precision.

@@ -169,28 +169,13 @@ pub fn sleeves(bosses: &[Boss], bores: &[(Vec3, Vec3, f64)], tolerance: f64) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::shapes;
 
     /// A cuboid from 0 to `size`, tags are the six faces.
     fn cuboid(size: Vec3) -> TriMesh {
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let corner = |k: u32| {
-            Vec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))
-                .component_mul(&size)
-        };
         TriMesh {
-            points: (0..8).map(corner).collect(),
-            triangles: quads
-                .iter()
-                .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-                .collect(),
             tags: (0..12).map(|t| t / 2).collect(),
+            ..shapes::cuboid(Vec3::zeros(), size)
         }
     }
 

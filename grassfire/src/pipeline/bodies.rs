@@ -166,10 +166,8 @@ pub(super) fn read(job: &ReconstructJob, _monitor: &Monitor) -> Result<Bodies, S
 
 #[cfg(feature = "occt")]
 fn append(to: &mut TriMesh, mesh: &Triangulation, number: usize) {
-    let before = to.points.len() as u32;
-    to.points.extend(mesh.points.iter().map(|p| Vec3::from(*p)));
-    let triangles = mesh.triangles.iter().map(|t| t.map(|v| v + before));
-    to.triangles.extend(triangles);
+    let points = mesh.points.iter().map(|p| Vec3::from(*p));
+    to.append(points, mesh.triangles.iter().copied());
     to.tags.resize(to.triangles.len(), number as u32);
 }
 
@@ -185,10 +183,10 @@ fn wall(bore: &cad::Bore) -> Capsule {
 #[cfg(feature = "occt")]
 fn kept_free(bore: &cad::Bore) -> Capsule {
     let at = |t: f64| bore.origin + t * bore.direction;
-    let [from, to] = bore.extent;
+    let [a, b] = bore.free_extent().map(at);
     Capsule {
-        a: at(from - bore.extension[0]),
-        b: at(to + bore.extension[1]),
+        a,
+        b,
         radius: bore.radius,
     }
 }

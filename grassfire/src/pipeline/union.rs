@@ -162,13 +162,12 @@ fn entry(body: &NonDesignResult, piece: Option<String>) -> NonDesignBlock {
 
 #[cfg(feature = "occt")]
 fn bore(bore: &cad::Bore) -> BoreBlock {
-    let [from, to] = bore.extent;
     BoreBlock {
         origin: bore.origin.into(),
         axis: bore.direction.into(),
         radius: bore.radius,
         extent: bore.extent,
-        cut: [from - bore.extension[0], to + bore.extension[1]],
+        cut: bore.free_extent(),
     }
 }
 

@@ -4,41 +4,20 @@ use super::*;
 use crate::Vec3;
 use crate::cad::NonDesignOptions;
 use crate::cad::from_mesh;
+use crate::mesh::shapes::{CUBOID, cuboid, cuboid_corners};
 use crate::pipeline::shape::surface;
 use crate::spline::ControlMesh;
-
-/// Corners of the faces of a cuboid (bit d of a corner: high in direction d), counter-clockwise from outside.
-const CUBOID: [[u32; 4]; 6] = [
-    [0, 2, 3, 1],
-    [4, 5, 7, 6],
-    [0, 1, 5, 4],
-    [2, 6, 7, 3],
-    [0, 4, 6, 2],
-    [1, 3, 7, 5],
-];
-
-fn corners(low: Vec3, high: Vec3) -> Vec<Vec3> {
-    let corner = |k: usize| Vec3::from_fn(|d, _| if k >> d & 1 == 1 { high[d] } else { low[d] });
-    (0..8).map(corner).collect()
-}
 
 /// A round body about the origin, some 30 mm across, and a cuboid with its low corner at `x`.
 fn body_and_cuboid(x: f64) -> Result<(Surface, Bodies), Box<dyn std::error::Error>> {
     let mesh = ControlMesh {
-        points: corners(Vec3::repeat(-20.0), Vec3::repeat(20.0)),
+        points: cuboid_corners(Vec3::repeat(-20.0), Vec3::repeat(20.0)),
         quads: CUBOID.to_vec(),
     };
     let monitor = Monitor::default();
     let surface = surface(&mesh, 1.0, &ReconstructOptions::default(), &monitor)?;
     let low = Vec3::new(x, -4.0, -4.0);
-    let cuboid = TriMesh {
-        points: corners(low, low + Vec3::repeat(8.0)),
-        triangles: CUBOID
-            .iter()
-            .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
-            .collect(),
-        tags: Vec::new(),
-    };
+    let cuboid = cuboid(low, low + Vec3::repeat(8.0));
     let options = NonDesignOptions::default();
     let solids = from_mesh("pad", "test", &cuboid, &options, &monitor)?;
     let mut bodies = Bodies::default();

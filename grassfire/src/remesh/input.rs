@@ -101,13 +101,9 @@ mod tests {
     fn a_hollow_cube_with_a_speck() {
         let mut mesh = cube(10.0);
         for (part, x, inward) in [(cube(4.0), 0.0, true), (cube(0.5), 20.0, false)] {
-            let n = mesh.points.len() as u32;
-            mesh.points
-                .extend(part.points.iter().map(|p| p + crate::Vec3::x() * x));
-            mesh.triangles.extend(part.triangles.iter().map(|t| {
-                let t = t.map(|v| v + n);
-                if inward { [t[0], t[2], t[1]] } else { t }
-            }));
+            let points = part.points.iter().map(|p| p + crate::Vec3::x() * x);
+            let turned = |[a, b, c]: [u32; 3]| if inward { [a, c, b] } else { [a, b, c] };
+            mesh.append(points, part.triangles.into_iter().map(turned));
         }
         let found = shells(&mesh).expect("closed");
         assert_eq!(found.len(), 3);

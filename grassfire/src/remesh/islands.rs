@@ -58,12 +58,9 @@ mod tests {
     fn a_speck_beside_the_part_is_lost_and_one_inside_is_not() {
         let mut mesh = cube(10.0);
         for x in [0.0, 9.0] {
-            let n = mesh.points.len() as u32;
             let speck = cube(0.2);
-            mesh.points
-                .extend(speck.points.iter().map(|p| p + Vec3::new(x, 0.0, 0.0)));
-            mesh.triangles
-                .extend(speck.triangles.iter().map(|t| t.map(|v| v + n)));
+            let points = speck.points.iter().map(|p| p + Vec3::new(x, 0.0, 0.0));
+            mesh.append(points, speck.triangles);
         }
         let mut field = VoxelGrid::filled(Vec3::repeat(-10.0), 1.0, [21; 3], 0f32);
         for v in 0..field.values.len() {

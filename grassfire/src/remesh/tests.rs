@@ -1,32 +1,12 @@
 //! The remesh of small made-up parts.
 
 use super::*;
+use crate::mesh::shapes::cuboid;
 
 /// A cube about the origin.
 pub(super) fn cube(side: f64) -> TriMesh {
-    let points = (0..8)
-        .map(|c| {
-            Vec3::new(f64::from(c & 1), f64::from(c >> 1 & 1), f64::from(c >> 2)).add_scalar(-0.5)
-                * side
-        })
-        .collect();
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = quads
-        .iter()
-        .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-        .collect();
-    TriMesh {
-        points,
-        triangles,
-        tags: vec![],
-    }
+    let half = Vec3::repeat(side / 2.0);
+    cuboid(-half, half)
 }
 
 fn remesh_at(mesh: &TriMesh, voxel: f64) -> Result<Remeshed, RemeshError> {

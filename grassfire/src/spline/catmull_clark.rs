@@ -246,20 +246,13 @@ pub fn triangles_of(quads: &[[u32; 4]], levels: u32) -> (Vec<[u32; 3]>, Vec<u32>
 mod tests {
     use super::*;
     use crate::Vec3;
+    use crate::mesh::shapes::{CUBOID, cuboid_corners};
 
     fn cube() -> ControlMesh {
-        let points = (0..8u32)
-            .map(|i| Vec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)))
-            .collect();
-        let quads = vec![
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        ControlMesh { points, quads }
+        ControlMesh {
+            points: cuboid_corners(Vec3::zeros(), Vec3::repeat(1.0)),
+            quads: CUBOID.to_vec(),
+        }
     }
 
     #[test]

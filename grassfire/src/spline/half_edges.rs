@@ -330,20 +330,13 @@ fn middle(mesh: &ControlMesh, edge: [u32; 2]) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::shapes::{CUBOID, cuboid_corners};
 
     fn cube() -> ControlMesh {
-        let points = (0..8)
-            .map(|k| Vec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)))
-            .collect();
-        let quads = vec![
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        ControlMesh { points, quads }
+        ControlMesh {
+            points: cuboid_corners(Vec3::zeros(), Vec3::repeat(1.0)),
+            quads: CUBOID.to_vec(),
+        }
     }
 
     fn error(mesh: &ControlMesh) -> SplineError {

@@ -30,10 +30,7 @@ fn block(lower: [f64; 3], upper: [f64; 3]) -> TriMesh {
 fn join(parts: &[TriMesh]) -> TriMesh {
     let mut out = TriMesh::default();
     for (tag, part) in parts.iter().enumerate() {
-        let shift = out.points.len() as u32;
-        out.points.extend(&part.points);
-        out.triangles
-            .extend(part.triangles.iter().map(|t| t.map(|v| v + shift)));
+        out.append(part.points.iter().copied(), part.triangles.iter().copied());
         out.tags.resize(out.triangles.len(), tag as u32);
     }
     out
