@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use grassfire_occt::{OcctError, Shape, StepTexts};
+use grassfire_occt::{OcctError, Shape, StepTexts, Triangulation};
 
 use super::build::{CadSolid, FaceSource, VOLUME_EPS};
 use super::non_design::NonDesignBody;
@@ -187,16 +187,13 @@ fn iges_time(iso: &str) -> String {
 /// Chords that are tried when the kernel cannot triangulate a face with the first, as multiples of it.
 const CHORDS: [f64; 5] = [1.0, 0.6, 0.3, 1.5, 2.5];
 
-/// Triangles within `chord` mm of the part, watertight. Tags: 0 for the fitted body, 1 + index for a non-design body.
+/// Triangles within `chord` mm of a shape.
 ///
 /// Where the kernel cannot triangulate a face with that chord, finer ones are tried, then ones up to 2.5 times as coarse.
-///
-/// # Errors
-/// [`CadError::Kernel`] when a face cannot be triangulated with any of them.
-pub fn tessellate(solid: &CadSolid, chord: f64) -> Result<TriMesh, CadError> {
+fn triangles(shape: &Shape, chord: f64) -> Result<Triangulation, OcctError> {
     // Of a copy: triangles that an earlier try has left stay otherwise.
     let of = |factor: &f64| {
-        let copy = solid.shape.translated([0.0; 3])?;
+        let copy = shape.translated([0.0; 3])?;
         copy.tessellate(chord * factor, FACET)
     };
     let mut mesh = of(&CHORDS[0]);
@@ -206,7 +203,16 @@ pub fn tessellate(solid: &CadSolid, chord: f64) -> Result<TriMesh, CadError> {
         }
         mesh = of(factor).or(mesh);
     }
-    let mesh = mesh?;
+    mesh
+}
+
+/// Triangles within `chord` mm of the part, watertight; up to 2.5 times as coarse where the kernel needs that. Tags: 0 for
+/// the fitted body, 1 + index for a non-design body.
+///
+/// # Errors
+/// [`CadError::Kernel`] when a face cannot be triangulated with any of them.
+pub fn tessellate(solid: &CadSolid, chord: f64) -> Result<TriMesh, CadError> {
+    let mesh = triangles(&solid.shape, chord)?;
     let tag = |f: &u32| match solid.sources.get(*f as usize) {
         Some(FaceSource::Body(i) | FaceSource::Bore(i, _)) => i + 1,
         _ => 0,
@@ -230,7 +236,7 @@ pub fn tessellate_solids(
     let names = names::solids(solid, options.product())?;
     let mut out = Vec::with_capacity(names.len());
     for (name, part) in names.into_iter().zip(solid.shape.solids()?) {
-        let mesh = part.tessellate(chord, FACET)?;
+        let mesh = triangles(&part, chord)?;
         out.push((
             name,
             TriMesh {
