@@ -14,6 +14,7 @@ mod measure;
 mod recognise;
 mod record;
 mod shape;
+mod short_edges;
 mod union;
 
 use std::path::PathBuf;

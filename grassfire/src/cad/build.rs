@@ -6,11 +6,11 @@ use super::bores::{self, Bore};
 use super::inspect::{self, NonDesignResult};
 use super::non_design::NonDesignBody;
 use super::reference::{self, Probe};
-use super::unite::{ATTEMPTS, Inputs, Kernel, kernel, shift};
+use super::unite::{ATTEMPTS, Booleans, Inputs, Kernel, booleans, kernel, shift};
 use super::{CadError, CadOptions, array, patches, shells, split};
 use crate::Vec3;
 use crate::monitor::Monitor;
-use crate::spline::{Brep, BrepFace};
+use crate::spline::{Brep, BrepFace, Crowded};
 
 /// Where a face of the part comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,6 +64,99 @@ pub(super) const VOLUME_EPS: f64 = 1e-8;
 /// Limit for identities between volumes.
 pub(super) const IDENTITY: f64 = 1e-6;
 
+/// The fitted body's solids, with the non-design bodies put to them but nothing checked yet.
+pub struct Joined {
+    body: Body,
+    bores: Vec<Vec<Bore>>,
+    tools: Vec<Option<Shape>>,
+    /// None without non-design bodies, or when the body itself is not sound.
+    union: Option<Union>,
+}
+
+struct Union {
+    bosses: Option<Shape>,
+    tools: Option<Shape>,
+    /// What the first of all attempts gave.
+    first: Result<Booleans, String>,
+}
+
+/// Builds the fitted body and unites it with the non-design bodies, without a check: the first steps of [`build`].
+///
+/// # Errors
+/// As for [`build`].
+pub fn join(
+    brep: &Brep,
+    bodies: &[NonDesignBody],
+    options: &CadOptions,
+    monitor: &Monitor,
+) -> Result<Joined, CadError> {
+    join_with(&kernel, brep, bodies, options, monitor)
+}
+
+/// [`join`] with booleans by `kernel`.
+pub(super) fn join_with(
+    kernel: &Kernel<'_>,
+    brep: &Brep,
+    bodies: &[NonDesignBody],
+    options: &CadOptions,
+    monitor: &Monitor,
+) -> Result<Joined, CadError> {
+    monitor.step(STAGE, "building faces", 0.0)?;
+    let body = Body::new(brep)?;
+    let bores = free_bores(bodies)?;
+    let tools: Vec<Option<Shape>> = bores
+        .iter()
+        .map(|bores| tool(bores))
+        .collect::<Result<_, _>>()?;
+    let union = if bodies.is_empty() || !body.problems.is_empty() {
+        None
+    } else {
+        let bosses = disjoint(bodies.iter().map(|b| &b.boss), options)?;
+        let cutters = disjoint(tools.iter().flatten(), options)?;
+        monitor.step(STAGE, ATTEMPTS[0].text, 0.1)?;
+        let inputs = Inputs {
+            bosses: bosses.as_ref(),
+            tools: cutters.as_ref(),
+            kernel,
+        };
+        let first = booleans(&body, &inputs, options.fuzzy, false, options, monitor);
+        monitor.check()?;
+        Some(Union {
+            bosses,
+            tools: cutters,
+            first,
+        })
+    };
+    Ok(Joined {
+        body,
+        bores,
+        tools,
+        union,
+    })
+}
+
+impl Joined {
+    /// Edges of the union that are shorter than `least` mm, the shortest first; `None` when there is no union.
+    ///
+    /// # Errors
+    /// [`CadError::Kernel`].
+    pub fn short_edges(&self, least: f64) -> Result<Option<Vec<Crowded>>, CadError> {
+        let Some(Ok(first)) = self.union.as_ref().map(|union| &union.first) else {
+            return Ok(None);
+        };
+        let edges = first.shape.edges()?;
+        let short = edges.iter().filter(|edge| edge.length < least);
+        let mut crowded: Vec<Crowded> = short
+            .map(|edge| Crowded {
+                place: edge.middle.into(),
+                length: edge.length,
+            })
+            .collect();
+        crowded.sort_by(|a, b| a.length.total_cmp(&b.length));
+        Ok(Some(crowded))
+    }
+}
+
 /// Builds the part.
 ///
 /// 1. Sort the shells into solids and cavities; build the solids directly; check them (BRepCheck, closed, volume equal to
@@ -84,59 +177,50 @@ pub fn build(
     options: &CadOptions,
     monitor: &Monitor,
 ) -> Result<CadSolid, CadError> {
-    build_with(&kernel, brep, bodies, options, monitor)
+    let joined = join(brep, bodies, options, monitor)?;
+    finish(joined, brep, bodies, options, monitor)
 }
 
-/// [`build`] with booleans by `kernel`.
-pub(super) fn build_with(
-    kernel: &Kernel<'_>,
+/// The rest of [`build`], from step 3 on, with what [`join`] gave for the same arguments.
+///
+/// # Errors
+/// As for [`build`].
+pub fn finish(
+    joined: Joined,
     brep: &Brep,
     bodies: &[NonDesignBody],
     options: &CadOptions,
     monitor: &Monitor,
 ) -> Result<CadSolid, CadError> {
-    monitor.step(STAGE, "building faces", 0.0)?;
-    let body = Body::new(brep)?;
+    finish_with(&kernel, joined, brep, bodies, options, monitor)
+}
+
+/// [`finish`] with booleans by `kernel`.
+pub(super) fn finish_with(
+    kernel: &Kernel<'_>,
+    joined: Joined,
+    brep: &Brep,
+    bodies: &[NonDesignBody],
+    options: &CadOptions,
+    monitor: &Monitor,
+) -> Result<CadSolid, CadError> {
+    let Joined {
+        body,
+        bores: bodies_holes,
+        tools,
+        union,
+    } = joined;
     let mut messages: Vec<String> = body.problems.clone();
-    let sound = messages.is_empty();
-    if !sound || bodies.is_empty() {
-        let sources = vec![FaceSource::Organic; brep.faces.len()];
-        let organic = body.shape.share()?;
-        let shape = if bodies.is_empty() {
-            single(body.shape)?
-        } else {
-            side_by_side(&body.shape, bodies)?
-        };
-        let context = inspect::Context {
-            bodies,
-            options,
-            probes: &[],
-            reference: brep.volume,
-        };
-        let sources = if bodies.is_empty() {
-            sources
-        } else {
-            inspect::separate_sources(&sources, bodies)?
-        };
-        let made = inspect::Made {
-            shape,
-            organic,
-            sources,
-            checked: None,
-        };
-        return inspect::report(made, messages, sound, &context, monitor);
-    }
-    let bodies_holes = free_bores(bodies)?;
-    let tools: Vec<Option<Shape>> = bodies_holes
-        .iter()
-        .map(|bores| tool(bores))
-        .collect::<Result<_, _>>()?;
+    let Some(union) = union else {
+        return without_union(body, brep, bodies, options, monitor);
+    };
     let still = Expected::new(brep, bodies, &tools, options, monitor)?;
     let inputs = Inputs {
-        bosses: disjoint(bodies.iter().map(|b| &b.boss), options)?,
-        tools: disjoint(tools.iter().flatten(), options)?,
+        bosses: union.bosses.as_ref(),
+        tools: union.tools.as_ref(),
         kernel,
     };
+    let mut first = Some(union.first);
     let mut split_body = None;
     let mut best: Option<CadSolid> = None;
     for attempt in ATTEMPTS {
@@ -157,7 +241,10 @@ pub(super) fn build_with(
                 &near(brep, bodies, &tools)?,
             ))?),
         };
-        let outcome = attempt.run(body, &inputs, &context, monitor);
+        let outcome = match first.take() {
+            Some(first) => first.and_then(|made| made.checked(body, &context)),
+            None => attempt.run(body, &inputs, &context, monitor),
+        };
         monitor.check()?;
         match outcome {
             Ok(united) => {
@@ -212,6 +299,40 @@ pub(super) fn build_with(
         &still.context(bodies, options),
         monitor,
     )
+}
+
+/// The fitted body alone, or beside the non-design bodies when it is not sound.
+fn without_union(
+    body: Body,
+    brep: &Brep,
+    bodies: &[NonDesignBody],
+    options: &CadOptions,
+    monitor: &Monitor,
+) -> Result<CadSolid, CadError> {
+    let sound = body.problems.is_empty();
+    let sources = vec![FaceSource::Organic; brep.faces.len()];
+    let organic = body.shape.share()?;
+    let (shape, sources) = if bodies.is_empty() {
+        (single(body.shape)?, sources)
+    } else {
+        (
+            side_by_side(&body.shape, bodies)?,
+            inspect::separate_sources(&sources, bodies)?,
+        )
+    };
+    let context = inspect::Context {
+        bodies,
+        options,
+        probes: &[],
+        reference: brep.volume,
+    };
+    let made = inspect::Made {
+        shape,
+        organic,
+        sources,
+        checked: None,
+    };
+    inspect::report(made, body.problems, sound, &context, monitor)
 }
 
 /// Volumes that the union must have.

@@ -1,6 +1,6 @@
 //! Everything that the report says about the finished part.
 
-use grassfire_occt::{Face, OcctError, Shape};
+use grassfire_occt::{Edge, Face, OcctError, Shape};
 use serde::Serialize;
 
 use super::bores::{Bore, ON_WALL};
@@ -192,9 +192,9 @@ pub(crate) fn report(
     };
     let euler = i64::from(counts.vertices) - i64::from(counts.edges) + 2 * i64::from(counts.faces)
         - i64::from(counts.wires);
-    let (mut g1_max, mut shortest) = (0.0f64, f64::MAX);
-    for edge in shape.edges()? {
-        shortest = shortest.min(edge.length);
+    let mut g1_max = 0.0f64;
+    let edges = shape.edges()?;
+    for edge in &edges {
         let smooth = |f: u32| sources.get(f as usize) == Some(&FaceSource::Organic);
         if let (Some([a, b]), Some(angle)) = (edge.faces, edge.angle)
             && smooth(a)
@@ -243,7 +243,7 @@ pub(crate) fn report(
         area: faces.iter().map(|face| face.area).sum(),
         genus: i64::from(counts.shells) - euler / 2,
         g1_max,
-        shortest_edge: if shortest == f64::MAX { 0.0 } else { shortest },
+        shortest_edge: shortest(&edges).unwrap_or(0.0),
         max_tolerance: shape.max_tolerance()?,
         volume_check: (volume - context.reference).abs() / context.reference.abs(),
         non_design,
@@ -251,6 +251,11 @@ pub(crate) fn report(
         messages,
         shape,
     })
+}
+
+/// Length of the shortest edge, mm.
+pub(super) fn shortest(edges: &[Edge]) -> Option<f64> {
+    edges.iter().map(|edge| edge.length).reduce(f64::min)
 }
 
 fn separate(body: &NonDesignBody) -> NonDesignResult {

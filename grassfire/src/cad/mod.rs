@@ -44,7 +44,7 @@ pub use options::{CadOptions, NonDesignOptions, StepOptions};
 #[cfg(feature = "occt")]
 pub use {
     bores::Bore,
-    build::{CadSolid, FaceSource, build},
+    build::{CadSolid, FaceSource, Joined, build, finish, join},
     inspect::NonDesignResult,
     non_design::{
         DesignSpace, NonDesignBody, Rebuilt, SpaceBore, from_boss, from_mesh, read,

@@ -21,6 +21,9 @@ pub struct CadOptions {
     pub distance_tolerance: f64,
     /// A boolean that runs longer than this counts as failed, s.
     pub boolean_seconds: f64,
+    /// When the union has edges shorter than this, voxels, the borders of the body's faces slide out of the way and it is
+    /// made again; 0 leaves them.
+    pub least_edge: f64,
     /// Rays across each non-design body in the independent volume check.
     pub rays: u32,
 }
@@ -34,6 +37,7 @@ impl Default for CadOptions {
             volume_tolerance: 2e-3,
             distance_tolerance: 1e-3,
             boolean_seconds: 300.0,
+            least_edge: 0.35,
             rays: 400,
         }
     }

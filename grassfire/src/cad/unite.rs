@@ -43,8 +43,8 @@ pub(super) fn kernel(
 
 /// What is added and what is cut, and by what.
 pub(super) struct Inputs<'a> {
-    pub(super) bosses: Option<Shape>,
-    pub(super) tools: Option<Shape>,
+    pub(super) bosses: Option<&'a Shape>,
+    pub(super) tools: Option<&'a Shape>,
     pub(super) kernel: &'a Kernel<'a>,
 }
 
@@ -142,26 +142,22 @@ impl Attempt {
         if let Some(problem) = body.problems.first() {
             return Err(problem.clone());
         }
+        let unite = |body: &Body| {
+            booleans(body, inputs, fuzzy, self.one_by_one, options, monitor)?.checked(body, context)
+        };
         if !self.shift {
-            return unite(body, inputs, fuzzy, self.one_by_one, context, monitor);
+            return unite(body);
         }
         let shape = body
             .shape
             .translated(array(shift(options)))
             .map_err(|e| e.0)?;
-        unite(
-            &Body {
-                shape,
-                face_volumes: Vec::new(),
-                problems: Vec::new(),
-                ..*body
-            },
-            inputs,
-            fuzzy,
-            self.one_by_one,
-            context,
-            monitor,
-        )
+        unite(&Body {
+            shape,
+            face_volumes: Vec::new(),
+            problems: Vec::new(),
+            ..*body
+        })
     }
 }
 
@@ -211,17 +207,27 @@ impl Progress<'_> {
     }
 }
 
-fn unite(
+/// What the booleans of an attempt gave, not yet checked.
+pub(super) struct Booleans {
+    pub(super) shape: Shape,
+    kinds: Vec<Kind>,
+    /// Common volume with the bosses, and with the tools, mm3.
+    commons: [f64; 2],
+    /// Volume of the bosses, mm3.
+    bosses: f64,
+}
+
+pub(super) fn booleans(
     body: &Body,
     inputs: &Inputs,
     fuzzy: f64,
     one_by_one: bool,
-    context: &inspect::Context,
+    options: &CadOptions,
     monitor: &Monitor,
-) -> Result<United, String> {
+) -> Result<Booleans, String> {
     let text = |e: OcctError| e.0;
     let start = Instant::now();
-    let limit = context.options.boolean_seconds;
+    let limit = options.boolean_seconds;
     let interrupt = move || monitor.check().is_err() || start.elapsed().as_secs_f64() > limit;
     let faces = body.shape.counts().map_err(text)?.faces as usize;
     let mut at = Progress {
@@ -236,8 +242,8 @@ fn unite(
     let mut commons = [0.0; 2];
     let mut bosses = 0.0;
     for (k, (operation, tools)) in [
-        (Operation::Fuse, &inputs.bosses),
-        (Operation::Cut, &inputs.tools),
+        (Operation::Fuse, inputs.bosses),
+        (Operation::Cut, inputs.tools),
     ]
     .into_iter()
     .enumerate()
@@ -258,20 +264,38 @@ fn unite(
         }
         commons[k] = at.common;
     }
-    let expected = body.volume + bosses - commons[0] - commons[1];
-    let shape = single(at.shape).map_err(text)?;
-    gates(&shape, body.solids, context)?;
-    let volume = body.volume_of(&shape).map_err(text)?;
-    volumes(volume, expected, commons, context)?;
-    let mesh_shape = shape.translated([0.0; 3]).map_err(text)?;
-    regions(&mesh_shape, &at.kinds, context)?;
-    Ok(United {
-        shape,
-        organic: body.shape.share().map_err(text)?,
-        mesh_shape,
+    Ok(Booleans {
+        shape: single(at.shape).map_err(text)?,
         kinds: at.kinds,
-        volume,
+        commons,
+        bosses,
     })
+}
+
+impl Booleans {
+    /// The union when it passes all checks.
+    pub(super) fn checked(self, body: &Body, context: &inspect::Context) -> Result<United, String> {
+        let text = |e: OcctError| e.0;
+        let Self {
+            shape,
+            kinds,
+            commons,
+            bosses,
+        } = self;
+        let expected = body.volume + bosses - commons[0] - commons[1];
+        gates(&shape, body.solids, context)?;
+        let volume = body.volume_of(&shape).map_err(text)?;
+        volumes(volume, expected, commons, context)?;
+        let mesh_shape = shape.translated([0.0; 3]).map_err(text)?;
+        regions(&mesh_shape, &kinds, context)?;
+        Ok(United {
+            shape,
+            organic: body.shape.share().map_err(text)?,
+            mesh_shape,
+            kinds,
+            volume,
+        })
+    }
 }
 
 /// What the kernel can check by itself.

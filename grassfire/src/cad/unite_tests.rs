@@ -4,14 +4,26 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::io::Read;
 
-use super::super::build::build_with;
+use super::super::build::{finish_with, join_with};
 use super::*;
-use crate::cad::{CadOptions, CadSolid, NonDesignOptions, from_mesh};
+use crate::cad::{CadError, CadOptions, CadSolid, NonDesignBody, NonDesignOptions, from_mesh};
 use crate::io::{ReadOptions, read_control_mesh_bytes};
 use crate::mesh::TriMesh;
 use crate::spline::{
     Brep, BrepOptions, ControlMesh, PatchOptions, SplineError, build_brep, patches,
 };
+
+/// The whole CAD stage with booleans by `kernel`.
+fn build_by(
+    kernel: &Kernel<'_>,
+    brep: &Brep,
+    bodies: &[NonDesignBody],
+    options: &CadOptions,
+    monitor: &Monitor,
+) -> Result<CadSolid, CadError> {
+    let joined = join_with(kernel, brep, bodies, options, monitor)?;
+    finish_with(kernel, joined, brep, bodies, options, monitor)
+}
 
 /// A square tube about z as a mesh: outside 10 x 10 x 8 mm, inside 6 x 6.
 fn tube() -> TriMesh {
@@ -169,7 +181,7 @@ fn with_wrong_kernel(wrong: usize) -> Result<(CadSolid, Vec<Call>), Box<dyn std:
         rays: 100,
         ..CadOptions::default()
     };
-    let solid = build_with(&spoiled, &brep, &bodies, &options, &monitor)?;
+    let solid = build_by(&spoiled, &brep, &bodies, &options, &monitor)?;
     Ok((solid, calls.into_inner()))
 }
 
@@ -277,7 +289,7 @@ fn ring_that_the_kernel_loses_is_missed() -> Result<(), Box<dyn std::error::Erro
         probes: &probes,
         reference: brep.volume + probes[0].part_volume - probes[0].organic_volume,
     };
-    let body = build_with(&kernel, &brep, &[], &options, &monitor)?;
+    let body = build_by(&kernel, &brep, &[], &options, &monitor)?;
     for fuzzy in [0.0, 1e-5] {
         let united = kernel(
             &body.shape,
@@ -320,7 +332,7 @@ fn ring_that_the_kernel_loses_is_missed() -> Result<(), Box<dyn std::error::Erro
         fuzzy: 0.0,
         ..CadOptions::default()
     };
-    let solid = build_with(&kernel, &brep, &bodies, &options, &monitor)?;
+    let solid = build_by(&kernel, &brep, &bodies, &options, &monitor)?;
     println!("{:#?}", solid.messages);
     assert!(solid.valid && solid.non_design[0].kept);
     assert!(solid.volume_check < 1e-4, "{}", solid.volume_check);

@@ -94,16 +94,17 @@ impl Site<'_> {
             target: &part.field,
             united: Some(wanted),
         };
-        let (axis, shape) = self.shape(&base)?;
+        let (axis, mut shape) = self.shape(&base)?;
         if !shape.sound() {
             self.give_up("its body cuts itself or folds over");
             return Ok(None);
         }
         let surface = self.surface(&shape)?;
+        let (surface, joined) = self.joined(&mut shape, surface)?;
         let voxel = remeshed.field.spacing;
         let bodies = &*self.bodies;
         let part = self.record.stage("cad", || {
-            union::united(&surface, bodies, 0, voxel, options, monitor)
+            union::united(&surface, joined, bodies, 0, voxel, options, monitor)
         })?;
         part.tell(monitor);
         if let Some(problem) = part.problem(&wanted) {
@@ -172,15 +173,24 @@ impl Site<'_> {
             target: &target,
             united: None,
         };
-        let (axis, shape) = self.shape(&base)?;
+        let (axis, mut shape) = self.shape(&base)?;
         let surface = self.surface(&shape)?;
         let intersections = shape.fitted.self_intersections.len();
         if shape.wrapped || intersections > 0 {
             self.bodies.drop_recognised(monitor);
         }
+        let (surface, joined) = self.joined(&mut shape, surface)?;
         let bodies = &mut *self.bodies;
         let part = self.record.stage("cad", || {
-            union::part(&surface, bodies, intersections, voxel, options, monitor)
+            union::part(
+                &surface,
+                joined,
+                bodies,
+                intersections,
+                voxel,
+                options,
+                monitor,
+            )
         })?;
         let distance = self.distance(&part)?;
         self.report(&axis, &shape, base.united);
@@ -204,21 +214,30 @@ impl Site<'_> {
         let shape = fewest(self.record, shape, voxel, options, monitor)?;
         self.record
             .stage("write", || delivery.skeleton(&shape.skeleton.skeleton))?;
-        self.record
-            .stage("write", || delivery.body(&shape.fitted.mesh))?;
         Ok((axis, shape))
     }
 
     fn surface(&mut self, shape: &Shape) -> Result<shape::Surface, PipelineError> {
-        let (options, monitor, delivery) = (self.options, self.monitor, self.delivery);
+        let (options, monitor) = (self.options, self.monitor);
         let voxel = self.remeshed.field.spacing;
         let surface = self.record.stage("spline", || {
             shape::surface(&shape.fitted.mesh, voxel, options, monitor)
         })?;
-        self.record.stage("write", || {
-            delivery.stl("body.stl", &surface.tessellation.mesh)
-        })?;
+        self.deliver_surface(shape, &surface)?;
         Ok(surface)
+    }
+
+    /// Writes the control mesh and its surface.
+    pub(super) fn deliver_surface(
+        &mut self,
+        shape: &Shape,
+        surface: &shape::Surface,
+    ) -> Result<(), PipelineError> {
+        let delivery = self.delivery;
+        self.record.stage("write", || {
+            delivery.body(&shape.fitted.mesh)?;
+            delivery.stl("body.stl", &surface.tessellation.mesh)
+        })
     }
 
     fn report(&mut self, axis: &MedialAxis, shape: &Shape, united: Option<Betti>) {

@@ -13,6 +13,8 @@ use crate::monitor::Monitor;
 #[cfg(feature = "occt")]
 use crate::report::BoreBlock;
 use crate::report::{NonDesignBlock, SolidBlock};
+#[cfg(not(feature = "occt"))]
+use crate::spline::Crowded;
 use crate::topology::Betti;
 
 /// The finished part.
@@ -66,13 +68,22 @@ impl Part {
 #[cfg(feature = "occt")]
 pub(super) fn part(
     surface: &Surface,
+    joined: Joined,
     bodies: &mut Bodies,
     intersections: usize,
     voxel: f64,
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Part, StageError> {
-    let part = united(surface, bodies, intersections, voxel, options, monitor)?;
+    let part = united(
+        surface,
+        joined,
+        bodies,
+        intersections,
+        voxel,
+        options,
+        monitor,
+    )?;
     if part.solid.valid || !bodies.recognised {
         part.tell(monitor);
         return Ok(part);
@@ -86,23 +97,75 @@ pub(super) fn part(
         ),
     );
     *bodies = Bodies::default();
-    let part = united(surface, bodies, intersections, voxel, options, monitor)?;
+    let joined = join(surface, bodies, options, monitor)?;
+    let part = united(
+        surface,
+        joined,
+        bodies,
+        intersections,
+        voxel,
+        options,
+        monitor,
+    )?;
     part.tell(monitor);
     Ok(part)
 }
 
-/// Builds the CAD solid, unites it with the non-design bodies and checks it. `intersections` is how often the fitted
+/// The body united with the non-design bodies, before any check.
+#[cfg(feature = "occt")]
+pub(super) type Joined = cad::Joined;
+/// Without OpenCASCADE nothing is united.
+#[cfg(not(feature = "occt"))]
+pub(super) struct Joined;
+
+/// Puts the non-design bodies to the body.
+#[cfg(feature = "occt")]
+pub(super) fn join(
+    surface: &Surface,
+    bodies: &Bodies,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Joined, StageError> {
+    Ok(cad::join(
+        &surface.brep,
+        &bodies.solids,
+        &options.cad,
+        monitor,
+    )?)
+}
+
+/// Without OpenCASCADE nothing is united.
+#[cfg(not(feature = "occt"))]
+pub(super) fn join(
+    _surface: &Surface,
+    _bodies: &Bodies,
+    _options: &ReconstructOptions,
+    _monitor: &Monitor,
+) -> Result<Joined, StageError> {
+    Ok(Joined)
+}
+
+#[cfg(not(feature = "occt"))]
+impl Joined {
+    /// There is no union.
+    pub(super) fn short_edges(&self, _least: f64) -> Result<Option<Vec<Crowded>>, StageError> {
+        Ok(None)
+    }
+}
+
+/// Makes the CAD solid from body and non-design bodies and checks it. `intersections` is how often the fitted
 /// body cuts itself: such a solid is never called valid, whatever the kernel says.
 #[cfg(feature = "occt")]
 pub(super) fn united(
     surface: &Surface,
+    joined: Joined,
     bodies: &Bodies,
     intersections: usize,
     voxel: f64,
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Part, StageError> {
-    let mut solid = cad::build(&surface.brep, &bodies.solids, &options.cad, monitor)?;
+    let mut solid = cad::finish(joined, &surface.brep, &bodies.solids, &options.cad, monitor)?;
     if intersections > 0 {
         solid.valid = false;
         monitor.warn(
@@ -175,19 +238,29 @@ fn bore(bore: &cad::Bore) -> BoreBlock {
 #[cfg(not(feature = "occt"))]
 pub(super) fn part(
     surface: &Surface,
+    joined: Joined,
     bodies: &mut Bodies,
     intersections: usize,
     voxel: f64,
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Part, StageError> {
-    united(surface, bodies, intersections, voxel, options, monitor)
+    united(
+        surface,
+        joined,
+        bodies,
+        intersections,
+        voxel,
+        options,
+        monitor,
+    )
 }
 
 /// Without OpenCASCADE the part is the limit surface of the body.
 #[cfg(not(feature = "occt"))]
 pub(super) fn united(
     surface: &Surface,
+    _joined: Joined,
     _bodies: &Bodies,
     _intersections: usize,
     _voxel: f64,

@@ -33,7 +33,8 @@ fn unite(
     bodies.recognised = recognised;
     let monitor = Monitor::default();
     let options = ReconstructOptions::default();
-    let part = part(&surface, &mut bodies, 0, 1.0, &options, &monitor)?;
+    let joined = join(&surface, &bodies, &options, &monitor)?;
+    let part = part(&surface, joined, &mut bodies, 0, 1.0, &options, &monitor)?;
     let warnings = monitor.warnings().into_iter().map(|w| w.text).collect();
     Ok((part, bodies, warnings))
 }

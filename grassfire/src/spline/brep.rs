@@ -65,16 +65,7 @@ pub fn build_brep(
         });
     }
     monitor.step(STAGE, "blocks", 0.0)?;
-    let (blocks, cut) = match options.faces {
-        FaceMode::Exact | FaceMode::Fewest => {
-            let mut cut = cut_lines(&half_edges);
-            (rectangular_blocks(mesh, &half_edges, &mut cut)?, cut)
-        }
-        FaceMode::Quads => {
-            let mut cut = vec![false; half_edges.twin.len()];
-            (single_quads(&half_edges, &mut cut), cut)
-        }
-    };
+    let (blocks, cut) = layout(mesh, &half_edges, options)?;
     monitor.step(STAGE, "faces", 0.3)?;
     let wires = wires(&half_edges, &cut, &blocks)?;
     let limit = smoothness_limit(mesh);
@@ -129,6 +120,44 @@ pub fn build_brep(
     Ok(brep)
 }
 
+/// The blocks of faces, and which half-edges lie on their borders.
+fn layout(
+    mesh: &ControlMesh,
+    half_edges: &QuadTopology,
+    options: &BrepOptions,
+) -> Result<(Vec<Block>, Vec<bool>), SplineError> {
+    Ok(match options.faces {
+        FaceMode::Exact | FaceMode::Fewest => {
+            let mut cut = cut_lines(half_edges);
+            (rectangular_blocks(mesh, half_edges, &mut cut)?, cut)
+        }
+        FaceMode::Quads => {
+            let mut cut = vec![false; half_edges.twin.len()];
+            (single_quads(half_edges, &mut cut), cut)
+        }
+    })
+}
+
+/// Which half-edges lie on borders of faces.
+pub(super) fn border_lines(
+    mesh: &ControlMesh,
+    half_edges: &QuadTopology,
+    options: &BrepOptions,
+) -> Result<Vec<bool>, SplineError> {
+    layout(mesh, half_edges, options).map(|(_, cut)| cut)
+}
+
+/// Which mesh points are vertices of the B-rep: where border lines end or meet.
+pub(super) fn vertices(half_edges: &QuadTopology, cut: &[bool]) -> Vec<u32> {
+    let mut degree = vec![0u32; half_edges.valence.len()];
+    for (h, _) in cut.iter().enumerate().filter(|(_, c)| **c) {
+        degree[half_edges.origin(h as u32) as usize] += 1;
+    }
+    (0..degree.len() as u32)
+        .filter(|&v| degree[v as usize] != 0 && degree[v as usize] != 2)
+        .collect()
+}
+
 /// Distance that rounding may cause between control points that should be equal.
 fn smoothness_limit(mesh: &ControlMesh) -> f64 {
     let largest = mesh.points.iter().fold(0.0f64, |m, p| m.max(p.amax()));
@@ -146,14 +175,8 @@ struct Wires {
 }
 
 fn wires(half_edges: &QuadTopology, cut: &[bool], blocks: &[Block]) -> Result<Wires, SplineError> {
-    let mut degree = vec![0u32; half_edges.valence.len()];
-    for (h, _) in cut.iter().enumerate().filter(|(_, c)| **c) {
-        degree[half_edges.origin(h as u32) as usize] += 1;
-    }
-    let vertices: Vec<u32> = (0..degree.len() as u32)
-        .filter(|&v| degree[v as usize] != 0 && degree[v as usize] != 2)
-        .collect();
-    let mut number = vec![u32::MAX; degree.len()];
+    let vertices = vertices(half_edges, cut);
+    let mut number = vec![u32::MAX; half_edges.valence.len()];
     vertices
         .iter()
         .enumerate()

@@ -141,12 +141,12 @@ fn face_count(mesh: &ControlMesh) -> Result<usize, SplineError> {
     Ok(rectangular_blocks(mesh, &half_edges, &mut cut)?.len())
 }
 
-fn surface(mesh: &ControlMesh) -> Result<TriMesh, SplineError> {
+pub(super) fn surface(mesh: &ControlMesh) -> Result<TriMesh, SplineError> {
     Ok(limit_mesh(mesh, LEVELS)?.0)
 }
 
 /// Patches that fold or nearly fold.
-fn folds(mesh: &ControlMesh, options: &PatchOptions) -> Result<usize, SplineError> {
+pub(super) fn folds(mesh: &ControlMesh, options: &PatchOptions) -> Result<usize, SplineError> {
     let all = jacobians(&patches(mesh, options, &Monitor::default())?);
     let folded = all.iter().filter(|j| j.value < options.fold_limit);
     Ok(folded.count())
