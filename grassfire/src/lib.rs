@@ -13,6 +13,8 @@ pub mod topology;
 pub mod voxel;
 
 pub mod cad;
+pub mod casting;
+pub mod edit;
 pub mod fit;
 pub mod io;
 pub mod medial;

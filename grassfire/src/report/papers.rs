@@ -185,6 +185,27 @@ pub const ALL: &[Paper] = &[
         stages: &["spline"],
         used_for: "which borders between faces can go",
     },
+    Paper {
+        key: "wlodawer1966",
+        citation: "R. Wlodawer (1966): Directional Solidification of Steel Castings. Pergamon Press.",
+        doi: "",
+        stages: &["feed"],
+        used_for: "the circle method of A. Heuvers (1929), known to us through foundry handbooks: sections grow towards the feeder; moduli of feeder and neck",
+    },
+    Paper {
+        key: "niyama1982",
+        citation: "E. Niyama, T. Uchida, M. Morikawa, S. Saito (1982): A method of shrinkage prediction and its application to steel casting practice. AFS International Cast Metals Journal 7.",
+        doi: "",
+        stages: &["solidify"],
+        used_for: "the criterion G / sqrt(R) near the end of freezing",
+    },
+    Paper {
+        key: "ahn2002",
+        citation: "H.-K. Ahn, M. de Berg, P. Bose, S.-W. Cheng, D. Halperin, J. Matousek, O. Schwarzkopf (2002): Separating an object from its cast. Computer-Aided Design 34.",
+        doi: "",
+        stages: &["mould"],
+        used_for: "a mould opens along a direction when every line along it meets the part in one interval",
+    },
 ];
 
 /// The papers behind `stages`, in the order of [`ALL`].

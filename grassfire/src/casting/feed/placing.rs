@@ -1,0 +1,165 @@
+//! Where one to three feeders stand best.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::error::FeedError;
+use super::graph::{Contact, FeedGraph, Seed, distances};
+use super::options::{FeedMode, FeedOptions};
+use super::rules::{Rules, contradiction};
+use super::sizing::feeder_size;
+use super::{check, shape};
+use crate::monitor::Monitor;
+use crate::skeleton::Skeleton;
+
+/// A set of feeders and what it costs.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Placement {
+    /// Skeleton points that the feeders stand at.
+    pub points: Vec<u32>,
+    /// Metal added to the part, mm3.
+    pub added: f64,
+    /// Metal of the feeders, mm3.
+    pub feeders: f64,
+}
+
+impl Placement {
+    /// Metal in all, mm3.
+    pub fn cost(&self) -> f64 {
+        self.added + self.feeders
+    }
+}
+
+/// The cheapest places for `count` feeders among `candidates` (skeleton points).
+///
+/// The cost is the metal that feeding adds to the part plus that of the feeders ([`feeder_size`]).
+/// 1. One feeder: every candidate is tried.
+/// 2. More: the best one more is added to those chosen so far; then, as long as that saves metal, one of them is moved to
+///    the best other candidate. The result is at least as good as every single exchange, not always the best of all sets.
+///
+/// Places that do not reach all of the part cost infinitely much. O(candidates * count * E log V) a round; the result does
+/// not depend on the number of threads.
+///
+/// # Errors
+/// [`FeedError`]: bad options, contradictory rules, no set of this size that reaches all of the part, cancelled.
+pub fn place_feeders(
+    skeleton: &Skeleton,
+    contacts: &[Contact],
+    candidates: &[u32],
+    count: usize,
+    options: &FeedOptions,
+    monitor: &Monitor,
+) -> Result<Placement, FeedError> {
+    check(options)?;
+    if count == 0 || candidates.is_empty() || options.mode == FeedMode::Direction {
+        return Err(FeedError::NoFeeder);
+    }
+    let site = Site {
+        graph: FeedGraph::new(skeleton, contacts),
+        skeleton,
+        contacts,
+        options,
+    };
+    let mut best = Placement::default();
+    for _ in 0..count {
+        best = site.extended(&best.points, candidates, monitor)?;
+    }
+    let mut moved = count > 1;
+    while moved {
+        moved = false;
+        for k in 0..count {
+            let mut rest = best.points.clone();
+            rest.remove(k);
+            let other = site.extended(&rest, candidates, monitor)?;
+            if other.cost() < best.cost() * (1.0 - 1e-9) {
+                best = other;
+                moved = true;
+            }
+        }
+    }
+    if !best.cost().is_finite() {
+        let reach = distances(&site.graph, &seeds(&best.points));
+        super::reached(&site.graph, &reach)?;
+    }
+    Ok(best)
+}
+
+struct Site<'a> {
+    graph: FeedGraph,
+    skeleton: &'a Skeleton,
+    contacts: &'a [Contact],
+    options: &'a FeedOptions,
+}
+
+impl Site<'_> {
+    /// `chosen` and the candidate that costs least with them.
+    fn extended(
+        &self,
+        chosen: &[u32],
+        candidates: &[u32],
+        monitor: &Monitor,
+    ) -> Result<Placement, FeedError> {
+        let tried = candidates.par_iter().map(|&candidate| {
+            monitor.check()?;
+            let mut points = chosen.to_vec();
+            points.push(candidate);
+            self.cost(points)
+        });
+        let tried: Vec<Placement> = tried.collect::<Result<_, FeedError>>()?;
+        let unreached = |p: &Placement| (p.cost(), p.feeders);
+        let best = tried.into_iter().min_by(|a, b| {
+            let (a, b) = (unreached(a), unreached(b));
+            a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+        });
+        Ok(best.unwrap_or_default())
+    }
+
+    fn cost(&self, points: Vec<u32>) -> Result<Placement, FeedError> {
+        let graph = &self.graph;
+        let distances = distances(graph, &seeds(&points));
+        let missed = distances.distance.iter().filter(|d| !d.is_finite());
+        let missed = missed.count();
+        if missed > 0 {
+            // The fewer points are missed the better, so that the next feeder can reach the rest.
+            return Ok(Placement {
+                points,
+                added: f64::INFINITY,
+                feeders: missed as f64,
+            });
+        }
+        let rules = Rules::new(
+            graph,
+            &self.skeleton.quads,
+            self.contacts,
+            &distances,
+            self.options,
+        );
+        let least = rules.raise().map_err(|c| contradiction(graph, &c))?;
+        let radii = rules.radii(&least.values);
+        let added = graph.volume(&radii) - graph.volume(&graph.radii);
+        let factors = graph.shape_factors();
+        let feeders = points.iter().enumerate().map(|(number, &foot)| {
+            let own = |v: &usize| distances.feeder[*v] == number as u32;
+            let zone: Vec<usize> = (0..radii.len()).filter(own).collect();
+            let foot = foot as usize;
+            let modulus = factors[foot] * radii[foot];
+            feeder_size(&shape(graph, &zone, &radii, modulus)).volume
+        });
+        let feeders = feeders.sum();
+        Ok(Placement {
+            points,
+            added,
+            feeders,
+        })
+    }
+}
+
+fn seeds(points: &[u32]) -> Vec<Seed> {
+    let each = points.iter().enumerate();
+    each.map(|(number, &point)| Seed {
+        point,
+        distance: 0.0,
+        feeder: number as u32,
+    })
+    .collect()
+}

@@ -1,0 +1,3 @@
+//! Casting: does the part feed, does it solidify towards its feeders, does it leave the mould?
+
+pub mod feed;
