@@ -22,6 +22,7 @@ mod step;
 mod stl;
 mod threemf;
 mod threemf_write;
+mod vti_write;
 mod vtk;
 mod vtk_array;
 mod vtk_grid;
@@ -40,6 +41,7 @@ pub use ply_write::{write_ply, write_poles};
 pub use skeleton::{read_skeleton, read_skeleton_bytes, write_skeleton};
 pub use stl::write_stl;
 pub use threemf_write::{ThreeMfObject, ThreeMfTexts, write_3mf};
+pub use vti_write::write_vti;
 
 use crate::mesh::{Repair, TriMesh};
 use crate::monitor::Monitor;

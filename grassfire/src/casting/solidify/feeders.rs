@@ -1,0 +1,94 @@
+//! Feeders as cylinders on the casting.
+
+use super::{SolidifyError, SolidifyOptions};
+use crate::Vec3;
+use crate::mesh::{Bvh, TriMesh};
+use crate::voxel::VoxelGrid;
+
+pub(super) fn up(options: &SolidifyOptions) -> Vec3 {
+    Vec3::from(options.up).normalize()
+}
+
+/// Adds the feeders to the distances; gives their feet and diameters.
+pub(super) fn add_feeders(
+    field: &mut VoxelGrid<f32>,
+    mesh: &TriMesh,
+    thick: f64,
+    options: &SolidifyOptions,
+) -> Result<Vec<(Vec3, f64)>, SolidifyError> {
+    let bvh = Bvh::new(mesh);
+    let up = up(options);
+    let mut feeders = Vec::new();
+    for (number, place) in options.feeders.iter().enumerate() {
+        let place = Vec3::from(*place);
+        // D / 6 is the modulus of a cylinder as high as wide.
+        let diameter = if options.feeder_diameter > 0.0 {
+            options.feeder_diameter
+        } else {
+            6.0 * crate::casting::feed::FEEDER * thick
+        };
+        let distance = bvh
+            .nearest(&place, f64::INFINITY)
+            .map_or(f64::INFINITY, |n| n.distance);
+        let limit = diameter / 2.0;
+        if distance > limit {
+            return Err(SolidifyError::Feeder {
+                feeder: number,
+                place,
+                distance,
+                limit,
+            });
+        }
+        feeders.push((place, diameter));
+    }
+    if feeders.is_empty() {
+        return Ok(feeders);
+    }
+    *field = roomy(field, &feeders, &up);
+    for v in 0..field.values.len() {
+        let [i, j, k] = field.ijk(v);
+        let p = field.centre(i, j, k);
+        let depth = feeders
+            .iter()
+            .map(|f| cylinder(&p, f, &up))
+            .fold(f64::NEG_INFINITY, f64::max);
+        let value = f64::from(field.values[v]);
+        field.values[v] = value.max(depth.max(-4.0 * field.spacing)) as f32;
+    }
+    Ok(feeders)
+}
+
+/// The field on a grid that holds the feeders, too.
+fn roomy(field: &VoxelGrid<f32>, feeders: &[(Vec3, f64)], up: &Vec3) -> VoxelGrid<f32> {
+    let h = field.spacing;
+    let top = |v: usize| field.dims[v] as f64 - 1.0;
+    let (mut lo, mut hi) = (Vec3::zeros(), Vec3::new(top(0), top(1), top(2)));
+    for (foot, diameter) in feeders {
+        let reach = Vec3::repeat(diameter / 2.0 + 3.0 * h);
+        for end in [*foot, foot + up * *diameter] {
+            lo = lo.inf(&field.to_grid(&(end - reach)));
+            hi = hi.sup(&field.to_grid(&(end + reach)));
+        }
+    }
+    let before = lo.map(|x| (-x).ceil().max(0.0) as usize);
+    let dims = [0, 1, 2].map(|a| (hi[a].ceil() as usize + 1).max(field.dims[a]) + before[a]);
+    let shift = Vec3::new(before.x as f64, before.y as f64, before.z as f64) * h;
+    let mut out = VoxelGrid::filled(field.origin - shift, h, dims, (-4.0 * h) as f32);
+    for (v, &f) in field.values.iter().enumerate() {
+        let [i, j, k] = field.ijk(v);
+        let at = out.index(i + before.x, j + before.y, k + before.z);
+        out.values[at] = f;
+    }
+    out
+}
+
+/// Depth in a feeder: a cylinder from half a diameter below its foot (inside the part) to one above.
+fn cylinder(p: &Vec3, (foot, diameter): &(Vec3, f64), up: &Vec3) -> f64 {
+    let along = (p - foot).dot(up);
+    let radial = (p - foot - along * up).norm();
+    (diameter / 2.0 - radial).min(diameter - along).min(along)
+}
+
+pub(super) fn in_feeder(p: &Vec3, feeder: &(Vec3, f64), up: &Vec3) -> bool {
+    cylinder(p, feeder, up) > 0.0
+}
