@@ -1,0 +1,346 @@
+//! The mould: undercuts, parting, draft, walls, the best draw direction, and repair.
+
+pub mod dexels;
+pub mod directions;
+pub mod draft;
+pub mod repair;
+pub mod rules;
+#[cfg(test)]
+mod tests;
+pub mod undercuts;
+mod walls;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use dexels::{Dexels, dexels};
+pub use directions::{Direction, best_direction};
+pub use draft::DraftClass;
+pub use repair::{Repair, RepairOptions, Repaired, repair};
+pub use rules::{Alloy, Limit, Process, Rules};
+pub use undercuts::{Undercut, parting, undercuts};
+pub use walls::{Wall, walls};
+
+use crate::Vec3;
+use crate::mesh::TriMesh;
+use crate::monitor::{Cancelled, Monitor};
+use crate::remesh::RemeshError;
+
+/// Name of this stage in progress and warnings.
+pub(crate) const STAGE: &str = "mould";
+
+/// Options of [`mould`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct MouldOptions {
+    /// Draw direction; without it the best is looked for.
+    pub draw: Option<[f64; 3]>,
+    /// Lines along the longer side of the part.
+    pub lines: usize,
+    /// Directions tried when the best is looked for.
+    pub directions: usize,
+    /// Undercuts below this are the lattice's, mm3; without it the volume of one voxel layer of the lattice's pitch.
+    pub least_undercut: Option<f64>,
+    /// Places at which walls are measured.
+    pub wall_samples: usize,
+    /// Share of the surface that may have less draft or a thinner wall: a smooth surface turns through zero draft at its
+    /// parting line, and walls end somewhere.
+    pub exempt: f64,
+    /// What is done about undercuts; the part without them is written as repaired.stl.
+    pub repair: Repair,
+    /// For the repair `keep`: what filling a volume costs against removing one.
+    pub fill_cost: f64,
+    /// Draft that the repair adds, degrees.
+    pub repair_draft: f64,
+    /// Voxel of the repair, mm; without it the pitch of the lines.
+    pub cell: Option<f64>,
+    /// Limits of the foundry.
+    pub rules: Rules,
+}
+
+impl Default for MouldOptions {
+    fn default() -> Self {
+        Self {
+            draw: None,
+            lines: 256,
+            directions: 300,
+            least_undercut: None,
+            wall_samples: 20_000,
+            exempt: 0.01,
+            repair: Repair::Off,
+            fill_cost: 0.5,
+            repair_draft: 0.0,
+            cell: None,
+            rules: Rules::default(),
+        }
+    }
+}
+
+/// A rule that is not met.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Finding {
+    /// Name of the rule.
+    pub rule: String,
+    /// Where, mm.
+    pub place: Vec3,
+    /// What was measured.
+    pub value: f64,
+    /// What is allowed.
+    pub limit: f64,
+    /// Where the limit comes from.
+    pub source: String,
+}
+
+/// How a part leaves its mould.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Mould {
+    /// Unit vector of the draw direction.
+    pub draw: Vec3,
+    /// What was found along it.
+    pub direction: Direction,
+    /// Undercuts that count, largest first.
+    pub undercuts: Vec<Undercut>,
+    /// Volume of all gaps, also of those that do not count, mm3.
+    pub undercut_volume: f64,
+    /// Range of the parting line across its plane, mm.
+    pub parting_flatness: f64,
+    /// Height of the parting plane along the draw direction, mm.
+    pub parting: f64,
+    /// Draft that all but the exempt share of the surface has, degrees.
+    pub min_draft: f64,
+    /// Areas by draft.
+    pub draft: Vec<DraftClass>,
+    /// Wall that all but the exempt share of places has, mm; none when no place has an opposite wall.
+    pub min_wall: Option<f64>,
+    /// Thick over thin walls: 95 % and 5 % of the places.
+    pub wall_ratio: f64,
+    /// Rules that are not met.
+    pub findings: Vec<Finding>,
+    /// The part without undercuts, when asked for.
+    pub repaired: Option<Repaired>,
+}
+
+/// Why a mould cannot be looked at.
+#[derive(Debug, thiserror::Error)]
+pub enum MouldError {
+    /// An option is out of its range.
+    #[error("mould.{name} is {value}, allowed is {allowed}")]
+    Option {
+        /// Name of the option.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// Nothing there.
+    #[error("the part has no surface")]
+    Empty,
+    /// The part could not be put on a grid for its repair.
+    #[error("the part cannot be put on a grid of {cell} mm")]
+    Grid {
+        /// Edge of a voxel, mm.
+        cell: f64,
+        /// Why.
+        source: RemeshError,
+    },
+    /// The user asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl MouldError {
+    /// What the user can do about it.
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::Option { .. } => Some("`grassfire schema` lists all options".to_owned()),
+            Self::Grid { source, .. } => source.hint(),
+            Self::Empty | Self::Cancelled(_) => None,
+        }
+    }
+}
+
+/// Angles by which the surface is sorted, degrees.
+const CLASSES: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
+
+/// Looks at how a closed part leaves a two-part mould.
+///
+/// 1. The draw direction as given, or the best ([`best_direction`]).
+/// 2. Undercuts, parting line, draft, walls.
+/// 3. The foundry's rules; every finding has a place, a value, a limit and its source.
+/// 4. The repair, when asked for.
+///
+/// Lengths in mm, angles in degrees. Does not depend on the number of threads.
+///
+/// # Errors
+/// [`MouldError`].
+pub fn mould(
+    mesh: &TriMesh,
+    options: &MouldOptions,
+    monitor: &Monitor,
+) -> Result<Mould, MouldError> {
+    check(options)?;
+    if mesh.triangles.is_empty() {
+        return Err(MouldError::Empty);
+    }
+    monitor.step(STAGE, "draw direction", 0.0)?;
+    let rules = &options.rules;
+    let wanted = rules.draft().value;
+    let draw = match options.draw {
+        Some(draw) => Vec3::from(draw).normalize(),
+        None => {
+            best_direction(
+                mesh,
+                options.directions,
+                128.min(options.lines),
+                wanted,
+                monitor,
+            )?
+            .draw
+        }
+    };
+    monitor.step(STAGE, "undercuts", 0.5)?;
+    let lattice = dexels(mesh, &draw, options.lines);
+    let mut found = undercuts(&lattice);
+    let undercut_volume: f64 = found.iter().map(|u| u.volume).sum();
+    let least = options
+        .least_undercut
+        .unwrap_or(8.0 * lattice.pitch.powi(3));
+    found.retain(|u| u.volume >= least);
+    let (parting_flatness, parting) = parting(&lattice);
+    monitor.step(STAGE, "walls", 0.7)?;
+    let measured = walls(mesh, options.wall_samples);
+    let pick = |share: f64| {
+        let at = (share * measured.len() as f64) as usize;
+        measured.get(at.min(measured.len().saturating_sub(1)))
+    };
+    let ratio = match (pick(0.95), pick(0.05)) {
+        (Some(thick), Some(thin)) => thick.thickness / thin.thickness,
+        _ => 1.0,
+    };
+    let mut out = Mould {
+        draw,
+        direction: directions::judge(mesh, &draw, options.lines, wanted),
+        undercuts: found,
+        undercut_volume,
+        parting_flatness,
+        parting,
+        min_draft: draft::least_draft(mesh, &draw, options.exempt),
+        draft: draft::draft_classes(mesh, &draw, &CLASSES),
+        min_wall: pick(options.exempt).map(|wall| wall.thickness),
+        wall_ratio: ratio,
+        ..Mould::default()
+    };
+    out.findings = findings(&out, mesh, pick(options.exempt), pick(0.95), rules);
+    if options.repair != Repair::Off || options.repair_draft > 0.0 {
+        monitor.step(STAGE, "repair", 0.8)?;
+        let cell = options.cell.unwrap_or(lattice.pitch);
+        let repair_options = RepairOptions {
+            kind: options.repair,
+            fill_cost: options.fill_cost,
+            draft: options.repair_draft,
+            parting,
+            cell,
+        };
+        out.repaired = Some(repair(mesh, &draw, &repair_options, monitor)?);
+    }
+    Ok(out)
+}
+
+fn findings(
+    mould: &Mould,
+    mesh: &TriMesh,
+    thin: Option<&Wall>,
+    thick: Option<&Wall>,
+    rules: &Rules,
+) -> Vec<Finding> {
+    let finding = |rule: &str, place: Vec3, value: f64, limit: Limit| Finding {
+        rule: rule.to_owned(),
+        place,
+        value,
+        limit: limit.value,
+        source: limit.source.to_owned(),
+    };
+    let mut out = Vec::new();
+    let cores = rules.cores();
+    if mould.undercuts.len() as f64 > cores.value {
+        for undercut in &mould.undercuts {
+            let limit = Limit {
+                value: 0.0,
+                ..cores
+            };
+            out.push(finding("undercut", undercut.place, undercut.volume, limit));
+        }
+    }
+    let flatness = rules.flatness();
+    if mould.parting_flatness > flatness.value {
+        let (lo, hi) = mesh.bounds().unwrap_or_default();
+        let centre = (lo + hi) / 2.0;
+        let place = centre + (mould.parting - centre.dot(&mould.draw)) * mould.draw;
+        out.push(finding(
+            "parting_flatness",
+            place,
+            mould.parting_flatness,
+            flatness,
+        ));
+    }
+    let draft = rules.draft();
+    if mould.min_draft < draft.value
+        && let Some((place, _)) = draft::low_draft_place(mesh, &mould.draw, draft.value)
+    {
+        out.push(finding("min_draft", place, mould.min_draft, draft));
+    }
+    let wall = rules.wall();
+    if let Some(thin) = thin.filter(|thin| thin.thickness < wall.value) {
+        out.push(finding("min_wall", thin.place, thin.thickness, wall));
+    }
+    let ratio = rules.ratio();
+    if mould.wall_ratio > ratio.value {
+        let place = thick.map_or_else(Vec3::zeros, |wall| wall.place);
+        out.push(finding("wall_ratio", place, mould.wall_ratio, ratio));
+    }
+    out
+}
+
+fn check(options: &MouldOptions) -> Result<(), MouldError> {
+    let range = |name, value: f64, lo: f64, hi: f64, allowed| {
+        if value.is_finite() && value >= lo && value <= hi {
+            Ok(())
+        } else {
+            Err(MouldError::Option {
+                name,
+                value,
+                allowed,
+            })
+        }
+    };
+    if let Some(draw) = options.draw {
+        let length = Vec3::from(draw).norm();
+        range("draw", length, 1e-9, 1e9, "a vector that is not zero")?;
+    }
+    range("lines", options.lines as f64, 8.0, 4096.0, "8 to 4096")?;
+    range(
+        "directions",
+        options.directions as f64,
+        1.0,
+        1e5,
+        "1 to 100000",
+    )?;
+    range("exempt", options.exempt, 0.0, 0.5, "0 to 0.5")?;
+    range("fill_cost", options.fill_cost, 0.0, 1e6, "0 or more")?;
+    range("repair_draft", options.repair_draft, 0.0, 30.0, "0 to 30")?;
+    range(
+        "cell",
+        options.cell.unwrap_or(1.0),
+        1e-3,
+        1e4,
+        "0.001 to 10000",
+    )?;
+    range(
+        "wall_samples",
+        options.wall_samples as f64,
+        0.0,
+        1e7,
+        "at most 10 million",
+    )
+}

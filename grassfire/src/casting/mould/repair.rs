@@ -1,0 +1,268 @@
+//! Repair of undercuts on the voxel field: fill, or keep the best interval of every line; draft on request.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::MouldError;
+use super::dexels::axes;
+use crate::Vec3;
+use crate::mesh::TriMesh;
+use crate::monitor::Monitor;
+use crate::remesh::{RemeshError, RemeshOptions, remesh, remesh_density};
+use crate::voxel::VoxelGrid;
+
+/// What is done about undercuts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Repair {
+    /// Nothing.
+    #[default]
+    Off,
+    /// Everything between the lowest and the highest material of a line is filled: the least part that leaves the mould and
+    /// holds the given one.
+    Fill,
+    /// Every line keeps the interval that is worth most: material counts 1, filling costs `mould.fill_cost`.
+    Keep,
+}
+
+/// How undercuts are removed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RepairOptions {
+    /// What is done.
+    pub kind: Repair,
+    /// For [`Repair::Keep`]: what filling a volume costs against removing one.
+    pub fill_cost: f64,
+    /// Draft to add, degrees.
+    pub draft: f64,
+    /// Height of the parting plane along the draw direction, mm.
+    pub parting: f64,
+    /// Edge of a voxel, mm.
+    pub cell: f64,
+}
+
+/// A part without undercuts.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Repaired {
+    /// Its surface, mm.
+    pub mesh: TriMesh,
+    /// Volume before and after on the same grid, mm3.
+    pub volume: [f64; 2],
+    /// Lines with more than one interval, before and after, on the voxels.
+    pub multiple: [usize; 2],
+}
+
+/// Removes undercuts along the unit vector `draw`.
+///
+/// 1. The part is turned so that the draw direction is z and measured on voxels of `cell` mm (signed distances).
+/// 2. [`Repair::Fill`]: every value becomes at least the smaller of the largest values above and below it on its line. All
+///    level sets of the result are single intervals, so the surface between voxels is, too.
+/// 3. [`Repair::Keep`]: on every line the interval with the largest sum of +1 a solid and `-cost` an empty voxel (Kadane's
+///    maximum subarray, exact); what lies outside goes, what lies inside is filled as above.
+/// 4. Draft: from both ends towards `parting`, every value becomes at least the one before plus the tangent of the draft
+///    times the step.
+/// 5. The surface is extracted and turned back.
+///
+/// # Errors
+/// [`MouldError::Grid`] when the part cannot be put on the grid; cancelled.
+pub fn repair(
+    mesh: &TriMesh,
+    draw: &Vec3,
+    options: &RepairOptions,
+    monitor: &Monitor,
+) -> Result<Repaired, MouldError> {
+    let (frame, cell) = (axes(draw), options.cell);
+    let turned = turn(mesh, |p| {
+        Vec3::new(p.dot(&frame[0]), p.dot(&frame[1]), p.dot(&frame[2]))
+    });
+    let on_grid = RemeshOptions {
+        voxel: Some(cell),
+        min_tunnel: 0.0,
+        ..RemeshOptions::default()
+    };
+    let fail = |source: RemeshError| match source {
+        RemeshError::Cancelled(cancelled) => MouldError::Cancelled(cancelled),
+        source => MouldError::Grid { cell, source },
+    };
+    let mut field = remesh(&turned, &on_grid, monitor).map_err(fail)?.field;
+    let before = (volume(&field), multiple(&field));
+    match options.kind {
+        Repair::Off => {}
+        Repair::Fill => fill(&mut field),
+        Repair::Keep => keep(&mut field, options.fill_cost),
+    }
+    if options.draft > 0.0 {
+        add_draft(
+            &mut field,
+            options.draft.to_radians().tan(),
+            options.parting,
+        );
+    }
+    let after = (volume(&field), multiple(&field));
+    // As a density: 1/2 at the surface, one voxel up and down.
+    let h = field.spacing as f32;
+    let density = VoxelGrid {
+        values: field.values.iter().map(|f| 0.5 + f / h).collect(),
+        ..field
+    };
+    let out = remesh_density(&density, 0.5, &on_grid, monitor).map_err(fail)?;
+    let back = |p: &Vec3| p.x * frame[0] + p.y * frame[1] + p.z * frame[2];
+    Ok(Repaired {
+        mesh: turn(out.solid.mesh(), back),
+        volume: [before.0, after.0],
+        multiple: [before.1, after.1],
+    })
+}
+
+fn turn(mesh: &TriMesh, f: impl Fn(&Vec3) -> Vec3) -> TriMesh {
+    TriMesh {
+        points: mesh.points.iter().map(f).collect(),
+        triangles: mesh.triangles.clone(),
+        tags: mesh.tags.clone(),
+    }
+}
+
+fn volume(field: &VoxelGrid<f32>) -> f64 {
+    // A voxel at the surface counts by its share.
+    let h = field.spacing;
+    let share = |f: &f32| (0.5 + f64::from(*f) / h).clamp(0.0, 1.0);
+    field.values.iter().map(share).sum::<f64>() * h.powi(3)
+}
+
+/// Lines along z with more than one interval of material.
+fn multiple(field: &VoxelGrid<f32>) -> usize {
+    let [nx, ny, nz] = field.dims;
+    let inside = |i: usize, j: usize, k: usize| field.values[field.index(i, j, k)] > 0.0;
+    let mut count = 0;
+    for j in 0..ny {
+        for i in 0..nx {
+            let begins = (0..nz).filter(|&k| inside(i, j, k) && (k == 0 || !inside(i, j, k - 1)));
+            count += usize::from(begins.count() > 1);
+        }
+    }
+    count
+}
+
+/// Calls `change` with the values of every line along z.
+fn for_each_line(field: &mut VoxelGrid<f32>, mut change: impl FnMut(&mut [f32])) {
+    let [nx, ny, nz] = field.dims;
+    let mut line = vec![0.0; nz];
+    for j in 0..ny {
+        for i in 0..nx {
+            for (k, value) in line.iter_mut().enumerate() {
+                *value = field.values[field.index(i, j, k)];
+            }
+            change(&mut line);
+            for (k, value) in line.iter().enumerate() {
+                let at = field.index(i, j, k);
+                field.values[at] = *value;
+            }
+        }
+    }
+}
+
+fn fill(field: &mut VoxelGrid<f32>) {
+    for_each_line(field, fill_line);
+}
+
+/// Every value at least the smaller of the largest on both sides.
+fn fill_line(line: &mut [f32]) {
+    let mut above = line.to_vec();
+    for k in (0..line.len().saturating_sub(1)).rev() {
+        above[k] = above[k].max(above[k + 1]);
+    }
+    let mut below = f32::NEG_INFINITY;
+    for (value, above) in line.iter_mut().zip(above) {
+        below = below.max(*value);
+        *value = value.max(below.min(above));
+    }
+}
+
+fn keep(field: &mut VoxelGrid<f32>, cost: f64) {
+    let out = -0.5 * field.spacing as f32;
+    for_each_line(field, |line| {
+        let worth = line.iter().map(|f| if *f > 0.0 { 1.0 } else { -cost });
+        let Some([first, last]) = best_interval(worth) else {
+            return;
+        };
+        for (k, value) in line.iter_mut().enumerate() {
+            if k < first || k > last {
+                *value = value.min(out);
+            }
+        }
+        fill_line(&mut line[first..=last]);
+    });
+}
+
+/// First and last of the interval with the largest positive sum (Kadane); none when no value is positive.
+fn best_interval(worth: impl Iterator<Item = f64>) -> Option<[usize; 2]> {
+    let (mut sum, mut first) = (0.0, 0);
+    let mut best: Option<(f64, [usize; 2])> = None;
+    for (k, w) in worth.enumerate() {
+        if sum <= 0.0 {
+            (sum, first) = (0.0, k);
+        }
+        sum += w;
+        if sum > best.map_or(0.0, |b| b.0) {
+            best = Some((sum, [first, k]));
+        }
+    }
+    best.map(|b| b.1)
+}
+
+/// Widens every line towards the height `parting` by `tangent` a length.
+fn add_draft(field: &mut VoxelGrid<f32>, tangent: f64, parting: f64) {
+    let step = (tangent * field.spacing) as f32;
+    // Beyond the exact band values say only "far": growth from there would make material of nothing.
+    let far = -2.5 * field.spacing as f32;
+    let middle = ((parting - field.origin.z) / field.spacing)
+        .round()
+        .max(0.0) as usize;
+    for_each_line(field, |line| {
+        let middle = middle.min(line.len() - 1);
+        for k in 1..=middle {
+            let grown = line[k - 1] + step;
+            if line[k - 1] > far {
+                line[k] = line[k].max(grown);
+            }
+        }
+        for k in (middle..line.len() - 1).rev() {
+            let grown = line[k + 1] + step;
+            if line[k + 1] > far {
+                line[k] = line[k].max(grown);
+            }
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_interval_is_that_of_all_pairs() {
+        let cases = [
+            vec![1.0, -0.4, 1.0, -2.0, 1.0],
+            vec![-1.0, -1.0],
+            vec![1.0, 1.0, -0.1, -0.1, 1.0],
+        ];
+        for worth in cases {
+            let mut best = (0.0, None);
+            for a in 0..worth.len() {
+                for b in a..worth.len() {
+                    let sum: f64 = worth[a..=b].iter().sum();
+                    if sum > best.0 + 1e-12 {
+                        best = (sum, Some([a, b]));
+                    }
+                }
+            }
+            assert_eq!(best_interval(worth.iter().copied()), best.1);
+        }
+    }
+
+    #[test]
+    fn a_filled_line_has_one_hill() {
+        let mut line = [-3.0, -1.0, 2.0, -1.0, -4.0, 1.0, -2.0];
+        fill_line(&mut line);
+        assert_eq!(line, [-3.0, -1.0, 2.0, 1.0, 1.0, 1.0, -2.0]);
+    }
+}

@@ -1,0 +1,173 @@
+use super::*;
+use crate::mesh::shapes::cuboid;
+
+fn boxes(list: &[[f64; 6]]) -> TriMesh {
+    let mut mesh = TriMesh::default();
+    for [x0, y0, z0, x1, y1, z1] in list {
+        let one = cuboid(Vec3::new(*x0, *y0, *z0), Vec3::new(*x1, *y1, *z1));
+        mesh.append(one.points, one.triangles);
+    }
+    mesh
+}
+
+/// An I-beam along x: two flanges of 30 x 4 and a web of 4, 24 high inside: along z 13 x 24 x 60 mm3 hidden on each side.
+fn beam() -> TriMesh {
+    boxes(&[
+        [0.0, -15.0, 0.0, 60.0, 15.0, 4.0],
+        [0.0, -15.0, 28.0, 60.0, 15.0, 32.0],
+        [0.0, -2.0, 0.0, 60.0, 2.0, 32.0],
+    ])
+}
+
+fn look(mesh: &TriMesh, options: &MouldOptions) -> Mould {
+    mould(mesh, options, &Monitor::default()).expect("a part")
+}
+
+fn along(draw: [f64; 3]) -> MouldOptions {
+    MouldOptions {
+        draw: Some(draw),
+        wall_samples: 2000,
+        ..MouldOptions::default()
+    }
+}
+
+#[test]
+fn undercuts_of_a_beam_are_known() {
+    let mesh = beam();
+    let found = look(&mesh, &along([0.0, 0.0, 1.0]));
+    assert_eq!(found.undercuts.len(), 2);
+    let exact = 2.0 * 13.0 * 24.0 * 60.0;
+    let layer = 2.0 * 24.0 * 60.0 * found.direction.draw.norm() * 60.0 / 256.0;
+    assert!(
+        (found.undercut_volume - exact).abs() <= layer,
+        "{}",
+        found.undercut_volume
+    );
+    let place = found.undercuts[0].place;
+    assert!((place.z - 16.0).abs() < 1e-6 && (place.y.abs() - 8.5).abs() < 0.2);
+    // Along y the flanges are no hindrance.
+    let found = look(&mesh, &along([0.0, 1.0, 0.0]));
+    assert!(found.undercuts.is_empty() && found.undercut_volume < 1e-6);
+    assert!(found.parting_flatness < 1e-9);
+}
+
+#[test]
+fn the_best_direction_of_a_beam_is_across() {
+    let tilt = nalgebra::Rotation3::from_euler_angles(0.3, -0.5, 0.8);
+    let mut mesh = beam();
+    for p in &mut mesh.points {
+        *p = tilt * *p;
+    }
+    let options = MouldOptions {
+        directions: 60,
+        lines: 64,
+        wall_samples: 200,
+        ..MouldOptions::default()
+    };
+    let found = look(&mesh, &options);
+    let across = tilt * Vec3::y();
+    let angle = found.draw.dot(&across).abs().min(1.0).acos().to_degrees();
+    assert!(angle < 1.0, "{angle:.2} degrees off");
+    assert!(found.undercuts.is_empty());
+}
+
+#[test]
+fn draft_of_a_wedge_is_known() {
+    // A truncated pyramid with sides at 5 degrees.
+    let d = 20.0 * 5.0_f64.to_radians().tan();
+    let mut mesh = cuboid(Vec3::zeros(), Vec3::new(30.0, 30.0, 20.0));
+    for p in &mut mesh.points {
+        if p.z > 10.0 {
+            p.x += if p.x > 15.0 { -d } else { d };
+            p.y += if p.y > 15.0 { -d } else { d };
+        }
+    }
+    let found = look(&mesh, &along([0.0, 0.0, 1.0]));
+    assert!((found.min_draft - 5.0).abs() < 1e-9, "{}", found.min_draft);
+    assert!(found.findings.iter().all(|f| f.rule != "min_draft"));
+    let upright = cuboid(Vec3::zeros(), Vec3::new(30.0, 30.0, 20.0));
+    let found = look(&upright, &along([0.0, 0.0, 1.0]));
+    assert!(found.min_draft == 0.0);
+    let finding = found
+        .findings
+        .iter()
+        .find(|f| f.rule == "min_draft")
+        .expect("a finding");
+    assert!(finding.limit == 1.0 && !finding.source.is_empty());
+}
+
+#[test]
+fn filling_leaves_one_interval_a_line_and_the_least_volume() {
+    let mesh = beam();
+    let options = MouldOptions {
+        repair: Repair::Fill,
+        // Upright walls of a voxel surface waver by a little: with draft they cannot hide anything.
+        repair_draft: 1.0,
+        cell: Some(1.0),
+        ..along([0.0, 0.0, 1.0])
+    };
+    let found = look(&mesh, &options);
+    let repaired = found.repaired.expect("asked for");
+    assert!(
+        repaired.multiple[0] > 500 && repaired.multiple[1] == 0,
+        "{:?}",
+        repaired.multiple
+    );
+    let whole = 60.0 * 30.0 * 32.0;
+    assert!(
+        (repaired.volume[1] / whole - 1.0).abs() < 0.05,
+        "{}",
+        repaired.volume[1]
+    );
+    let again = look(&repaired.mesh, &along([0.0, 0.0, 1.0]));
+    assert!(
+        again.undercut_volume < 1e-3 * whole,
+        "{}",
+        again.undercut_volume
+    );
+}
+
+#[test]
+fn keeping_drops_the_lesser_flange_when_filling_is_dear() {
+    // The lower flange is twice as thick as the upper one.
+    let mesh = boxes(&[
+        [0.0, -15.0, 0.0, 60.0, 15.0, 8.0],
+        [0.0, -15.0, 28.0, 60.0, 15.0, 32.0],
+        [0.0, -2.0, 0.0, 60.0, 2.0, 32.0],
+    ]);
+    let options = MouldOptions {
+        repair: Repair::Keep,
+        fill_cost: 1.0,
+        cell: Some(1.0),
+        ..along([0.0, 0.0, 1.0])
+    };
+    let repaired = look(&mesh, &options).repaired.expect("asked for");
+    assert_eq!(repaired.multiple[1], 0);
+    let wanted = 60.0 * (30.0 * 8.0 + 4.0 * 24.0);
+    assert!(
+        (repaired.volume[1] / wanted - 1.0).abs() < 0.06,
+        "{}",
+        repaired.volume[1]
+    );
+}
+
+#[test]
+fn walls_and_options_are_checked() {
+    let plate = cuboid(Vec3::zeros(), Vec3::new(60.0, 40.0, 2.5));
+    let found = look(&plate, &along([0.0, 0.0, 1.0]));
+    assert!((found.min_wall.expect("walls") - 2.5).abs() < 1e-9);
+    let finding = found
+        .findings
+        .iter()
+        .find(|f| f.rule == "min_wall")
+        .expect("a finding");
+    assert_eq!(finding.limit, 6.0);
+    let zero = mould(&plate, &along([0.0; 3]), &Monitor::default());
+    assert!(matches!(zero, Err(MouldError::Option { name: "draw", .. })));
+    let none = mould(
+        &TriMesh::default(),
+        &along([0.0, 0.0, 1.0]),
+        &Monitor::default(),
+    );
+    assert!(matches!(none, Err(MouldError::Empty)));
+}
