@@ -30,6 +30,12 @@ pub enum Command {
     /// Turns a mesh or a density into a STEP solid and a report
     #[command(after_help = RECONSTRUCT_EXAMPLES)]
     Reconstruct(Box<ReconstructArgs>),
+    /// Computes how a solid freezes in sand: hot spots, feeding, Niyama's criterion
+    #[command(after_help = SOLIDIFY_EXAMPLES)]
+    Solidify(SolidifyArgs),
+    /// Looks at how a solid leaves its mould: undercuts, parting, draft, walls
+    #[command(after_help = MOULD_EXAMPLES)]
+    Mould(MouldArgs),
     /// Runs everything on a built-in example
     Demo(DemoArgs),
     /// Prints the JSON Schema of all options (the keys of --set)
@@ -50,6 +56,51 @@ Examples:
   grassfire reconstruct part.stl -o out
   grassfire reconstruct part.stl --non-design bores.step --voxel 0.8 -o out
   grassfire reconstruct density.vti --iso 0.4 --set remesh.min_tunnel=0 -o out --json";
+
+const SOLIDIFY_EXAMPLES: &str = "\
+Examples:
+  grassfire solidify part.stl -o out --set solidify.material=a356
+  grassfire solidify part.step --feeder 112,0,15 --set solidify.feeder_diameter=40 -o out";
+
+/// Arguments of `solidify`.
+#[derive(Debug, Args)]
+pub struct SolidifyArgs {
+    /// The solid: a mesh or STEP
+    #[arg(value_name = "SOLID")]
+    pub part: PathBuf,
+    /// Where a feeder stands, mm; may be repeated (solidify.feeders)
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    pub feeder: Vec<[f64; 3]>,
+    /// Folder for the results; made when missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// What all runs share.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+const MOULD_EXAMPLES: &str = "\
+Examples:
+  grassfire mould part.stl --draw 0,0,1 -o out
+  grassfire mould part.step -o out                    the best draw direction is looked for
+  grassfire mould proposal.stl --draw 0,0,1 --set mould.repair=fill -o out";
+
+/// Arguments of `mould`.
+#[derive(Debug, Args)]
+pub struct MouldArgs {
+    /// The solid: a mesh or STEP
+    #[arg(value_name = "SOLID")]
+    pub part: PathBuf,
+    /// Draw direction; without it the best is looked for (mould.draw)
+    #[arg(long, value_name = "DX,DY,DZ", value_parser = vector, allow_hyphen_values = true)]
+    pub draw: Option<[f64; 3]>,
+    /// Folder for the results; made when missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// What all runs share.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
 
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
@@ -84,6 +135,15 @@ pub struct ReconstructArgs {
     /// Files to write besides part.step and part.stl; may be repeated or a comma list (files.formats)
     #[arg(long, value_enum, value_name = "FORMAT", value_delimiter = ',')]
     pub format: Vec<FileFormat>,
+    /// Where a feeder stands, mm: sections grow towards it; may be repeated (feed.feeders)
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    pub feeder: Vec<[f64; 3]>,
+    /// How much sections grow towards the feeders, radius a length (feed.growth)
+    #[arg(long, value_name = "G", value_parser = finite, allow_negative_numbers = true)]
+    pub growth: Option<f64>,
+    /// Draw direction of the mould: the finished part is looked at along it (mould.draw, feed.draw)
+    #[arg(long, value_name = "DX,DY,DZ", value_parser = vector, allow_hyphen_values = true)]
+    pub draw: Option<[f64; 3]>,
     /// Refuse a mesh that needs repair (repair.strict)
     #[arg(long)]
     pub strict: bool,
@@ -189,6 +249,14 @@ fn finite(text: &str) -> Result<f64, String> {
     } else {
         Err("must be finite".to_owned())
     }
+}
+
+fn vector(text: &str) -> Result<[f64; 3], String> {
+    let parts: Vec<f64> = text
+        .split(',')
+        .map(|part| finite(part.trim()))
+        .collect::<Result<_, _>>()?;
+    <[f64; 3]>::try_from(parts).map_err(|_| "three numbers with commas wanted".to_owned())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -34,6 +34,8 @@ fn main() -> ExitCode {
 fn dispatch(command: &Command) -> Result<u8, Failure> {
     match command {
         Command::Reconstruct(args) => return run::reconstruct_command(args),
+        Command::Solidify(args) => return run::solidify_command(args),
+        Command::Mould(args) => return run::mould_command(args),
         Command::Demo(args) => return run::demo_command(args),
         Command::Schema => run::print(&schema()?),
         Command::About(args) => run::print(&about::text(args.cite)),

@@ -7,10 +7,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use grassfire::io::atomic_write;
 use grassfire::monitor::Monitor;
-use grassfire::pipeline::{Format, Outcome, ReconstructJob, ReconstructOptions, reconstruct};
+use grassfire::pipeline::{
+    Format, Outcome, PipelineError, ReconstructJob, ReconstructOptions, SolidJob, mould_solid,
+    reconstruct, solidify_solid,
+};
 use grassfire::report;
 
-use crate::args::{DemoArgs, Example, Faces, FileFormat, Recognise, ReconstructArgs, RunArgs};
+use crate::args::{
+    DemoArgs, Example, Faces, FileFormat, MouldArgs, Recognise, ReconstructArgs, RunArgs,
+    SolidifyArgs,
+};
 use crate::failure::{Failure, chain};
 use crate::progress::{Bar, Shared, Talk};
 use crate::{settings, summary};
@@ -44,6 +50,13 @@ pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
         };
         ("brep.faces", mode.to_owned())
     }));
+    if !args.feeder.is_empty() {
+        short.push(("feed.feeders", format!("{:?}", args.feeder)));
+    }
+    short.extend(args.growth.map(|g| ("feed.growth", g.to_string())));
+    for key in ["feed.draw", "mould.draw"] {
+        short.extend(args.draw.map(|d| (key, format!("{d:?}"))));
+    }
     let job = ReconstructJob {
         part: args.part.clone(),
         non_design: args.non_design.clone(),
@@ -53,7 +66,38 @@ pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
         command: command_line(),
         options: options(&short, &args.run)?,
     };
-    run(&job, &args.run)
+    let work = |monitor: &Monitor| reconstruct(&job, monitor);
+    run(job.options.threads, &job.output, &args.run, work)
+}
+
+/// `grassfire solidify`.
+pub fn solidify_command(args: &SolidifyArgs) -> Result<u8, Failure> {
+    let mut short = Vec::new();
+    if !args.feeder.is_empty() {
+        short.push(("solidify.feeders", format!("{:?}", args.feeder)));
+    }
+    let job = SolidJob {
+        part: args.part.clone(),
+        output: args.output.clone(),
+        command: command_line(),
+        options: options(&short, &args.run)?,
+    };
+    let work = |monitor: &Monitor| solidify_solid(&job, monitor);
+    run(job.options.threads, &job.output, &args.run, work)
+}
+
+/// `grassfire mould`.
+pub fn mould_command(args: &MouldArgs) -> Result<u8, Failure> {
+    let draw = args.draw.map(|d| ("mould.draw", format!("{d:?}")));
+    let short: Vec<_> = draw.into_iter().collect();
+    let job = SolidJob {
+        part: args.part.clone(),
+        output: args.output.clone(),
+        command: command_line(),
+        options: options(&short, &args.run)?,
+    };
+    let work = |monitor: &Monitor| mould_solid(&job, monitor);
+    run(job.options.threads, &job.output, &args.run, work)
 }
 
 /// The list of formats as a setting.
@@ -107,7 +151,8 @@ pub fn demo_command(args: &DemoArgs) -> Result<u8, Failure> {
         command,
         options,
     };
-    run(&job, &args.run)
+    let work = |monitor: &Monitor| reconstruct(&job, monitor);
+    run(job.options.threads, &job.output, &args.run, work)
 }
 
 fn unpack(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, Failure> {
@@ -154,25 +199,26 @@ fn options(short: &[(&str, String)], args: &RunArgs) -> Result<ReconstructOption
     Ok(options)
 }
 
-fn run(job: &ReconstructJob, args: &RunArgs) -> Result<u8, Failure> {
+/// Does `work` with progress, warnings and Ctrl-C, and says how it went.
+fn run(
+    threads: usize,
+    output: &Path,
+    args: &RunArgs,
+    work: impl FnOnce(&Monitor) -> Result<Outcome, PipelineError>,
+) -> Result<u8, Failure> {
     let talk = match (args.quiet, args.verbose) {
         (true, _) => Talk::Quiet,
         (_, true) => Talk::Verbose,
         _ => Talk::Normal,
     };
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(job.options.threads)
+        .num_threads(threads)
         .build_global();
-    pool.map_err(|e| {
-        Failure::usage(
-            format!("cannot start {} threads: {e}", job.options.threads),
-            None,
-        )
-    })?;
+    pool.map_err(|e| Failure::usage(format!("cannot start {threads} threads: {e}"), None))?;
     let bar = Arc::new(Bar::new(talk));
     let monitor = Arc::new(Monitor::with_progress(Box::new(Shared(Arc::clone(&bar)))));
     cancel_on_interrupt(&monitor)?;
-    let result = reconstruct(job, &monitor);
+    let result = work(&monitor);
     bar.finish();
     if talk != Talk::Quiet {
         for warning in monitor.warnings() {
@@ -180,7 +226,7 @@ fn run(job: &ReconstructJob, args: &RunArgs) -> Result<u8, Failure> {
         }
     }
     let outcome = result?;
-    say(&outcome, job, args)?;
+    say(&outcome, output, args)?;
     Ok(if outcome.failed_checks.is_empty() {
         0
     } else {
@@ -202,13 +248,13 @@ fn cancel_on_interrupt(monitor: &Arc<Monitor>) -> Result<(), Failure> {
         .map_err(|e| Failure::usage(format!("cannot catch Ctrl-C: {e}"), None))
 }
 
-fn say(outcome: &Outcome, job: &ReconstructJob, args: &RunArgs) -> Result<(), Failure> {
+fn say(outcome: &Outcome, output: &Path, args: &RunArgs) -> Result<(), Failure> {
     let text = if args.json {
         report::to_json(&outcome.report).map_err(|e| Failure::usage(chain(&e), None))?
     } else if args.quiet {
         String::new()
     } else {
-        summary::text(&outcome.report, &job.output)
+        summary::text(&outcome.report, output)
     };
     print(&text);
     Ok(())

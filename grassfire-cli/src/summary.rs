@@ -61,6 +61,7 @@ pub fn text(report: &Report, output: &Path) -> String {
             ),
         ));
     }
+    lines.extend(casting(report));
     let met = report.checks.iter().filter(|check| check.met).count();
     lines.push(("checks", format!("{met} of {} met", report.checks.len())));
     for check in report.checks.iter().filter(|check| !check.met) {
@@ -89,7 +90,12 @@ pub fn text(report: &Report, output: &Path) -> String {
             .fold(0.0, f64::max);
         lines.push(("time", format!("{seconds:.1} s, {memory:.0} MB")));
     }
-    for name in ["part.step", "report.html"] {
+    for name in [
+        "part.step",
+        "solidification.vti",
+        "repaired.stl",
+        "report.html",
+    ] {
         if report.files.iter().any(|file| file.path == name) {
             lines.push(("written", output.join(name).display().to_string()));
         }
@@ -99,6 +105,47 @@ pub fn text(report: &Report, output: &Path) -> String {
         let _ = writeln!(text, "{name:>9}  {value}");
         text
     })
+}
+
+/// Feeding and solidification.
+fn casting(report: &Report) -> Vec<(&'static str, String)> {
+    let mut lines = Vec::new();
+    if let Some(block) = &report.feed {
+        let text = format!(
+            "growth {}, {} of {} rules broken before, {} after, {:+.0} mm3",
+            block.growth,
+            block.violations_before,
+            block.rules,
+            block.violations,
+            block.added_volume
+        );
+        lines.push(("feeding", text));
+    }
+    if let Some(block) = &report.mould {
+        let text = format!(
+            "{} undercuts of {:.0} mm3 along ({:.3}, {:.3}, {:.3}), parting within {:.2} mm, {} findings",
+            block.undercuts,
+            block.undercut_volume,
+            block.draw[0],
+            block.draw[1],
+            block.draw[2],
+            block.parting_flatness,
+            block.findings.len()
+        );
+        lines.push(("mould", text));
+    }
+    if let Some(block) = &report.solidify {
+        let isolated = block.hot_spots.iter().filter(|spot| !spot.fed).count();
+        let text = format!(
+            "{} solid after {:.0} s, {isolated} isolated hot spots of {:.0} mm3, {:.0} % fed until frozen",
+            block.material,
+            block.freeze_time,
+            block.isolated_volume,
+            100.0 * block.directional_fraction
+        );
+        lines.push(("freezing", text));
+    }
+    lines
 }
 
 #[cfg(test)]

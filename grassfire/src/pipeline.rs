@@ -3,10 +3,12 @@
 //! A newcomer reads [`reconstruct`]: every stage is one call, its result one value that the next stage takes.
 
 mod bodies;
+mod casting;
 mod construct;
 mod deliver;
 mod error;
 mod exchange;
+mod feeding;
 mod fewest;
 mod illustrate;
 mod inputs;
@@ -22,11 +24,15 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use casting::{SolidJob, mould_solid, solidify_solid};
 pub use error::{PipelineError, StageError};
 pub use exchange::{FileOptions, Format};
 pub use shape::RetryOptions;
 
 use crate::cad::{CadOptions, NonDesignOptions, StepOptions};
+use crate::casting::feed::FeedOptions;
+use crate::casting::mould::MouldOptions;
+use crate::casting::solidify::SolidifyOptions;
 use crate::fit::FitOptions;
 use crate::io::ReadOptions;
 use crate::medial::{self, MedialOptions, PoleOptions};
@@ -71,6 +77,8 @@ pub struct ReconstructOptions {
     pub thicken: ThickenOptions,
     /// Fit to the proposal.
     pub fit: FitOptions,
+    /// Sections that grow towards the feeders.
+    pub feed: FeedOptions,
     /// What to do when a body cuts itself.
     pub retry: RetryOptions,
     /// The body's last resort on bulky parts.
@@ -87,6 +95,10 @@ pub struct ReconstructOptions {
     pub files: FileOptions,
     /// Texts in the STEP, IGES and 3MF files.
     pub step: StepOptions,
+    /// Mould: undercuts, parting, draft, walls.
+    pub mould: MouldOptions,
+    /// Solidification.
+    pub solidify: SolidifyOptions,
     /// Report and pictures.
     pub report: ReportOptions,
 }
@@ -124,13 +136,14 @@ pub struct Outcome {
 /// 1. Reads the proposal and the non-design bodies; repairs the mesh; recognises bores and bosses in it.
 /// 2. Remeshes it on voxels to a closed solid and removes topological noise.
 /// 3. Computes wall thickness (poles).
-/// 4. Cuts the non-design bodies out; steps 5 to 8 are done with what is left, and once more with the whole proposal when
+/// 4. With feeders, lets the proposal's sections grow towards them.
+/// 5. Cuts the non-design bodies out; steps 6 to 9 are done with what is left, and once more with the whole proposal when
 ///    that does not give a valid union.
-/// 5. Computes the pruned medial axis; builds the quad skeleton (or reads the given one), maps and smooths its radii.
-/// 6. Thickens it and fits the limit surface to the proposal.
-/// 7. Builds the G1 faces and the boundary representation.
-/// 8. Builds the CAD solid, unites it with the non-design bodies, checks it.
-/// 9. Measures distance and volume, draws the pictures, writes the report.
+/// 6. Computes the pruned medial axis; builds the quad skeleton (or reads the given one), maps and smooths its radii.
+/// 7. Thickens it and fits the limit surface to the proposal; with feeders, radii that still fall short grow.
+/// 8. Builds the G1 faces and the boundary representation.
+/// 9. Builds the CAD solid, unites it with the non-design bodies, checks it.
+/// 10. Measures distance and volume, draws the pictures, writes the report.
 ///
 /// Files are written as their stage ends, each atomically; nothing is written when the input is refused.
 ///
@@ -161,16 +174,35 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         inputs::remesh(&proposal, &bodies, options, monitor)
     })?;
     record.report.remesh = Some(measure::remesh_block(&remeshed));
-    let delivery = record.stage("write", || Delivery::open(&job.output))?;
+    let placed;
+    let options = if options.feed.feeders.is_empty() {
+        options
+    } else {
+        placed = record.stage("feed", || feeding::placed(options, &remeshed, monitor))?;
+        &placed
+    };
+    let delivery = record.stage("write", || Delivery::open(&job.output, deliver::FILES))?;
     record.stage("write", || delivery.proposal(&remeshed.solid))?;
 
     let poles = record.stage("poles", || {
         medial::poles(&remeshed.solid, &options.poles, monitor)
     })?;
     record.stage("write", || delivery.poles(&poles, &remeshed.solid))?;
+    let edited = match drawn {
+        // The radii of a drawn skeleton are what its author wants: they are edited, not the proposal.
+        Some(_) => None,
+        None => feeding::edit(&mut record, &remeshed, &bodies, options, monitor)?,
+    };
+    let original = remeshed;
+    let remeshed = edited.as_ref().unwrap_or(&original);
+    if edited.is_some() {
+        record.stage("write", || {
+            delivery.stl("edited.stl", remeshed.solid.mesh())
+        })?;
+    }
     let mut site = Site {
         record: &mut record,
-        remeshed: &remeshed,
+        remeshed,
         bodies: &mut bodies,
         drawn: drawn.as_ref(),
         delivery: &delivery,
@@ -205,12 +237,14 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
     })?;
 
     measure::name_far_places(&distance, remeshed.field.spacing, monitor);
-    record.report.distance = Some(measure::distance_block(&distance, &remeshed, &part));
-    record.report.volume = Some(measure::volume_block(&remeshed, &part));
+    record.report.distance = Some(measure::distance_block(&distance, remeshed, &part));
+    record.report.volume = Some(measure::volume_block(remeshed, &part));
 
+    feeding::prove(&mut record, &original, &part.mesh, options, monitor)?;
+    casting::mould_of(&mut record, &part.mesh, &options.mould, monitor)?;
     let pictures = record.stage("pictures", || {
         let stages = illustrate::Stages {
-            remeshed: &remeshed,
+            remeshed,
             poles: &poles,
             axis: &axis,
             shape: &shape,

@@ -3,6 +3,7 @@
 use super::bodies::Bodies;
 use super::deliver::Delivery;
 use super::error::{PipelineError, StageError};
+use super::feeding::fed;
 use super::fewest::fewest;
 use super::record::Record;
 use super::shape::{self, Base, Shape};
@@ -210,6 +211,7 @@ impl Site<'_> {
         })?;
         self.record.stage("write", || delivery.medial(&axis.mesh))?;
         let shape = shape::shape(self.record, &axis, base, self.drawn, options, monitor)?;
+        let shape = fed(self.record, shape, base, self.bodies, options, monitor)?;
         let voxel = base.remeshed.field.spacing;
         let shape = fewest(self.record, shape, voxel, options, monitor)?;
         self.record

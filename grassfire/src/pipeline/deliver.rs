@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::StageError;
+use crate::casting::solidify::Solidification;
 use crate::io::{self, IoError};
 use crate::medial::{MedialMesh, Poles};
 use crate::mesh::{Solid, TriMesh};
@@ -13,7 +14,7 @@ use crate::skeleton::Skeleton;
 use crate::spline::ControlMesh;
 
 /// All files that a reconstruction may write, and what they hold.
-const FILES: [(&str, &str); 16] = [
+pub(super) const FILES: &[(&str, &str)] = &[
     ("part.step", "the solid, STEP AP242"),
     ("part.stl", "the solid, triangles"),
     ("part.3mf", "the solid, triangles with unit and names"),
@@ -26,6 +27,7 @@ const FILES: [(&str, &str); 16] = [
     ("poles.ply", "pole skeleton with radii"),
     ("thickness.ply", "proposal with wall thickness"),
     ("proposal.stl", "remeshed proposal"),
+    ("edited.stl", "remeshed proposal after the feeding edit"),
     (
         "design_part.stl",
         "remeshed proposal without its non-design bodies",
@@ -41,11 +43,16 @@ const PIECES: &str = "pieces";
 /// The open result folder.
 pub(super) struct Delivery {
     folder: PathBuf,
+    /// Names that a run of this kind may write, and what they hold.
+    files: &'static [(&'static str, &'static str)],
 }
 
 impl Delivery {
     /// Makes the folder and takes away what an earlier run left in it.
-    pub(super) fn open(folder: &Path) -> Result<Self, IoError> {
+    pub(super) fn open(
+        folder: &Path,
+        files: &'static [(&'static str, &'static str)],
+    ) -> Result<Self, IoError> {
         let fail = |path: &Path, source| IoError::Write {
             file: path.display().to_string(),
             source,
@@ -53,21 +60,25 @@ impl Delivery {
         std::fs::create_dir_all(folder).map_err(|e| fail(folder, e))?;
         let delivery = Self {
             folder: folder.to_owned(),
+            files,
         };
-        for (name, _) in FILES {
+        for (name, _) in files {
             delivery.remove(name)?;
         }
-        for piece in delivery.pieces() {
-            delivery.remove(&piece)?;
+        if files == FILES {
+            for piece in delivery.pieces() {
+                delivery.remove(&piece)?;
+            }
+            // Something else may lie in it: then it stays.
+            let _ = std::fs::remove_dir(folder.join(PIECES));
         }
-        // Something else may lie in it: then it stays.
-        let _ = std::fs::remove_dir(folder.join(PIECES));
         Ok(delivery)
     }
 
     /// The files of the pieces that are there: `organic.step` and `body-*.step`.
     fn pieces(&self) -> Vec<String> {
-        let Ok(entries) = std::fs::read_dir(self.folder.join(PIECES)) else {
+        let entries = std::fs::read_dir(self.folder.join(PIECES));
+        let Some(entries) = entries.ok().filter(|_| self.files == FILES) else {
             return Vec::new();
         };
         let ours = |name: &String| {
@@ -128,6 +139,15 @@ impl Delivery {
         io::write_skeleton(&self.path("skeleton.ply"), skeleton)
     }
 
+    pub(super) fn solidification(&self, frozen: &Solidification) -> Result<(), IoError> {
+        let fields = [
+            ("solid_time", &frozen.time),
+            ("feeding_time", &frozen.feeding),
+            ("niyama", &frozen.niyama),
+        ];
+        io::write_vti(&self.path("solidification.vti"), &fields)
+    }
+
     pub(super) fn body(&self, mesh: &ControlMesh) -> Result<(), IoError> {
         io::write_control_mesh(&self.path("body.obj"), mesh)
     }
@@ -166,7 +186,13 @@ impl Delivery {
         });
         let pieces: Vec<(&str, String)> = pieces.collect();
         let pieces = pieces.iter().map(|(name, text)| (*name, text.as_str()));
-        report.files = FILES.into_iter().chain(pieces).filter_map(entry).collect();
+        report.files = self
+            .files
+            .iter()
+            .copied()
+            .chain(pieces)
+            .filter_map(entry)
+            .collect();
         report::write_html(&self.path("report.html"), report, pictures)?;
         report::write_json(&self.path("report.json"), report)?;
         Ok(self.manifest(report)?)

@@ -3,6 +3,10 @@
 use std::path::PathBuf;
 
 use crate::cad::CadError;
+use crate::casting::feed::FeedError;
+use crate::casting::mould::MouldError;
+use crate::casting::solidify::SolidifyError;
+use crate::edit::EditError;
 use crate::fit::FitError;
 use crate::io::IoError;
 use crate::medial::MedialError;
@@ -46,6 +50,14 @@ pub enum StageError {
     #[error(transparent)]
     Thicken(#[from] ThickenError),
     #[error(transparent)]
+    Feed(#[from] FeedError),
+    #[error(transparent)]
+    Edit(#[from] EditError),
+    #[error(transparent)]
+    Mould(#[from] MouldError),
+    #[error(transparent)]
+    Solidify(#[from] SolidifyError),
+    #[error(transparent)]
     Fit(#[from] FitError),
     #[error(transparent)]
     Spline(#[from] SplineError),
@@ -86,6 +98,10 @@ impl PipelineError {
         }
         match self.source {
             StageError::Io(_) | StageError::Repair(_) | StageError::Remesh(_) => 2,
+            StageError::Feed(FeedError::Contradiction { .. }) => 3,
+            StageError::Feed(_) => 2,
+            StageError::Solidify(SolidifyError::NotFrozen { .. }) => 3,
+            StageError::Solidify(_) | StageError::Mould(_) => 2,
             _ if matches!(self.stage, "options" | "read" | "non_design" | "recognise") => 2,
             _ => 3,
         }
@@ -101,6 +117,10 @@ impl PipelineError {
             StageError::Medial(e) => e.hint(),
             StageError::Skeleton(e) => e.hint(),
             StageError::Thicken(e) => e.hint(),
+            StageError::Feed(e) => e.hint(),
+            StageError::Edit(e) => e.hint(),
+            StageError::Mould(e) => e.hint(),
+            StageError::Solidify(e) => e.hint(),
             StageError::Fit(e) => e.hint(),
             StageError::Spline(e) => e.hint(),
             StageError::Cad(e) => e.hint(),
@@ -135,6 +155,9 @@ impl PipelineError {
                 | StageError::Medial(MedialError::Cancelled(_))
                 | StageError::Skeleton(SkeletonError::Cancelled(_))
                 | StageError::Thicken(ThickenError::Cancelled(_))
+                | StageError::Feed(FeedError::Cancelled(_))
+                | StageError::Mould(MouldError::Cancelled(_))
+                | StageError::Solidify(SolidifyError::Cancelled(_))
                 | StageError::Fit(FitError::Cancelled(_))
                 | StageError::Spline(SplineError::Cancelled(_))
                 | StageError::Cad(CadError::Cancelled(_))

@@ -162,7 +162,7 @@ pub(super) fn fingerprints(
     paths.map(|path| fingerprint(path, monitor)).collect()
 }
 
-fn fingerprint(path: &Path, monitor: &Monitor) -> Result<InputFile, StageError> {
+pub(super) fn fingerprint(path: &Path, monitor: &Monitor) -> Result<InputFile, StageError> {
     monitor.check()?;
     let bytes = std::fs::read(path).map_err(|source| IoError::Open {
         file: path.display().to_string(),

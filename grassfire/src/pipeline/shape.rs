@@ -39,6 +39,7 @@ impl Default for RetryOptions {
 }
 
 /// The quad skeleton, the body thickened from it, and its fit to the proposal.
+#[derive(Clone)]
 pub(super) struct Shape {
     pub(super) skeleton: QuadSkeleton,
     pub(super) body: ThickenedBody,

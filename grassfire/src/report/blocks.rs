@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::Check;
+use super::{Check, FeedBlock, MouldBlock, SolidifyBlock};
 use crate::monitor::Warning;
 use crate::remesh::{ChangeKind, TopologyChange};
 use crate::spline::CurvatureJump;
@@ -41,6 +41,15 @@ pub struct Report {
     /// Volume of the solid against the proposal.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume: Option<VolumeBlock>,
+    /// The feeding edit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feed: Option<FeedBlock>,
+    /// The mould.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mould: Option<MouldBlock>,
+    /// Solidification.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub solidify: Option<SolidifyBlock>,
     /// The non-design bodies.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub non_design: Vec<NonDesignBlock>,

@@ -7,7 +7,7 @@ use super::Report;
 use crate::topology::Betti;
 
 /// Unit of checks that count what is wrong.
-const DEFECTS: &str = "defects";
+pub(super) const DEFECTS: &str = "defects";
 
 /// What a result must keep to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -25,6 +25,8 @@ pub struct Limits {
     pub volume_check: f64,
     /// Largest distance from the solid's non-design faces to the given bodies, mm.
     pub non_design: f64,
+    /// Largest isolated hot spot when feeders are given, mm3.
+    pub hot_spot: f64,
 }
 
 impl Default for Limits {
@@ -36,6 +38,7 @@ impl Default for Limits {
             g1: 0.01,
             volume_check: 1e-4,
             non_design: 1e-3,
+            hot_spot: 1000.0,
         }
     }
 }
@@ -79,6 +82,7 @@ pub fn judge(report: &Report, limits: &Limits) -> Vec<Check> {
     }
     solid(report, limits, &mut checks);
     fidelity(report, limits, &mut checks);
+    super::casting::judge(report, limits, &mut checks);
     if !report.refused.is_empty() {
         let text = "Every file asked for is written";
         let missing = report.refused.len() as f64;
@@ -87,7 +91,7 @@ pub fn judge(report: &Report, limits: &Limits) -> Vec<Check> {
     checks
 }
 
-fn check(name: &str, text: &str, value: f64, limit: f64, unit: &str) -> Check {
+pub(super) fn check(name: &str, text: &str, value: f64, limit: f64, unit: &str) -> Check {
     let value = value.is_finite().then_some(value);
     let met = value.is_some_and(|v| v <= limit);
     Check {
@@ -208,16 +212,16 @@ fn fidelity(report: &Report, limits: &Limits, checks: &mut Vec<Check>) {
             limits.distance_p95,
             "voxels",
         ));
-        if let Some(mm) = distance.non_design_max {
-            let text = "Non-design faces against the given bodies";
-            checks.push(check(
-                "distance.non_design_max",
-                text,
-                mm,
-                limits.non_design,
-                "mm",
-            ));
-        }
+    }
+    if let Some(mm) = report.distance.as_ref().and_then(|d| d.non_design_max) {
+        let text = "Non-design faces against the given bodies";
+        checks.push(check(
+            "distance.non_design_max",
+            text,
+            mm,
+            limits.non_design,
+            "mm",
+        ));
     }
     if let Some(volume) = &report.volume {
         let percent = 100.0 * volume.relative_difference.abs();

@@ -4,6 +4,7 @@
 //! ran. Numbers are finite: what could not be measured is left out.
 
 mod blocks;
+mod casting;
 mod checks;
 mod format;
 mod html;
@@ -22,6 +23,10 @@ pub use blocks::{
     FileEntry, InputBlock, InputFile, NonDesignBlock, RadiusRange, RefusedFile, RemeshBlock,
     RepairEntry, Report, SkeletonBlock, SolidBlock, StageEntry, TopologyBlock, TopologyChangeEntry,
     VolumeBlock,
+};
+pub use casting::{
+    FeedBlock, FeederBlock, FindingBlock, HotSpotBlock, InfeasibleBlock, MouldBlock, SolidifyBlock,
+    UndercutBlock,
 };
 pub use checks::{Check, Limits, judge};
 pub use html::to_html;

@@ -69,6 +69,6 @@ fn faces(rows: &[DesignFaceBlock]) -> Markup {
     }
 }
 
-fn place(at: &[f64; 3]) -> String {
+pub(super) fn place(at: &[f64; 3]) -> String {
     format!("({:.2}, {:.2}, {:.2})", at[0], at[1], at[2])
 }

@@ -16,6 +16,7 @@ mod legend;
 pub mod pictures;
 mod raster;
 mod scene;
+pub mod section;
 
 pub use camera::Camera;
 pub use legend::{ColourMap, Legend};

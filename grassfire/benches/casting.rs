@@ -1,0 +1,156 @@
+//! Cost of feeding, feeder placement, solidification and the draw search, and how it grows.
+//!
+//! Run with `cargo bench --bench casting`; `-- small` leaves out the grid of 5 million cells. Prints seconds and, where the
+//! size grows, the cost relative to the smallest.
+
+use std::time::Instant;
+
+use grassfire::Vec3;
+use grassfire::casting::feed::{FeedOptions, feed, place_feeders};
+use grassfire::casting::mould::best_direction;
+use grassfire::casting::solidify::{SolidifyOptions, solidify};
+use grassfire::mesh::TriMesh;
+use grassfire::monitor::Monitor;
+use grassfire::skeleton::Skeleton;
+
+fn main() {
+    let small = std::env::args().any(|arg| arg == "small");
+    feeding();
+    placement();
+    draw_search();
+    freezing(if small { &[40, 60, 80] } else { &[40, 80, 160] });
+}
+
+/// A wavy sheet of n x n quads with uneven radii.
+fn sheet(n: u32) -> Skeleton {
+    let mut skeleton = Skeleton::default();
+    for j in 0..=n {
+        for i in 0..=n {
+            let (x, y) = (f64::from(i), f64::from(j));
+            skeleton
+                .points
+                .push(Vec3::new(x, y, 2.0 * (x / 7.0).sin()) * 4.0);
+            skeleton.radii.push(4.0 + (1.7 * x).sin() * (2.3 * y).cos());
+        }
+    }
+    for j in 0..n {
+        for i in 0..n {
+            let a = j * (n + 1) + i;
+            skeleton.quads.push([a, a + 1, a + n + 2, a + n + 1]);
+        }
+    }
+    skeleton
+}
+
+fn fed_at(skeleton: &Skeleton) -> FeedOptions {
+    FeedOptions {
+        feeders: vec![skeleton.points[skeleton.points.len() / 2].into()],
+        ..FeedOptions::default()
+    }
+}
+
+fn feeding() {
+    println!("feeding: points, ms, cost a point relative to the first");
+    let mut first = None;
+    for n in [49, 99, 199, 399] {
+        let skeleton = sheet(n);
+        let options = fed_at(&skeleton);
+        let clock = Instant::now();
+        feed(&skeleton, &[], &options, &Monitor::default()).expect("it feeds");
+        let ms = 1e3 * clock.elapsed().as_secs_f64();
+        let each = ms / skeleton.points.len() as f64;
+        let base = *first.get_or_insert(each);
+        println!(
+            "{:>8} {ms:>9.2} {:>6.2}",
+            skeleton.points.len(),
+            each / base
+        );
+    }
+}
+
+fn placement() {
+    let skeleton = sheet(40);
+    let all: Vec<u32> = (0..1000).collect();
+    println!(
+        "placement on {} points, 1000 candidates: feeders, s",
+        skeleton.points.len()
+    );
+    for count in [1, 2] {
+        let clock = Instant::now();
+        let options = FeedOptions::default();
+        place_feeders(&skeleton, &[], &all, count, &options, &Monitor::default())
+            .expect("it feeds");
+        println!("{count:>8} {:>9.2}", clock.elapsed().as_secs_f64());
+    }
+}
+
+/// A bracket of boxes with a pocket, each box with `n` x `n` squares a side.
+fn bracket() -> TriMesh {
+    let mut mesh = TriMesh::default();
+    for [x0, y0, z0, x1, y1, z1] in [
+        [0.0, 0.0, 0.0, 120.0, 60.0, 10.0],
+        [0.0, 0.0, 0.0, 10.0, 60.0, 50.0],
+        [110.0, 0.0, 0.0, 120.0, 60.0, 50.0],
+        [0.0, 0.0, 40.0, 50.0, 60.0, 50.0],
+    ] {
+        let corner = |i: usize| {
+            let pick = |bit: usize, low: f64, high: f64| if i >> bit & 1 == 1 { high } else { low };
+            Vec3::new(pick(0, x0, x1), pick(1, y0, y1), pick(2, z0, z1))
+        };
+        let faces = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        for face in faces {
+            let [a, b, c, d] = face.map(corner);
+            let n = 40_u32;
+            let at = |i: u32, j: u32| {
+                let (s, t) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
+                a * (1.0 - s) * (1.0 - t) + b * s * (1.0 - t) + c * s * t + d * (1.0 - s) * t
+            };
+            let points = (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j)));
+            let quads = (0..n).flat_map(|j| (0..n).map(move |i| j * (n + 1) + i));
+            let triangles = quads.flat_map(|v| [[v, v + 1, v + n + 2], [v, v + n + 2, v + n + 1]]);
+            mesh.append(
+                points.map(|(i, j)| at(i, j)).collect::<Vec<_>>(),
+                triangles.collect::<Vec<_>>(),
+            );
+        }
+    }
+    mesh
+}
+
+fn draw_search() {
+    let mesh = bracket();
+    let clock = Instant::now();
+    let best = best_direction(&mesh, 300, 128, 1.0, &Monitor::default()).expect("not cancelled");
+    println!(
+        "draw search, {} triangles, 300 directions, 128 lines: {:.2} s, undercut {:.0} mm3",
+        mesh.triangles.len(),
+        clock.elapsed().as_secs_f64(),
+        best.undercut
+    );
+}
+
+fn freezing(across: &[u32]) {
+    let mesh = bracket();
+    println!("solidification: cells, steps, s, ns a cell and step");
+    for &n in across {
+        let options = SolidifyOptions {
+            cell: Some(120.0 / f64::from(n)),
+            ..SolidifyOptions::default()
+        };
+        let clock = Instant::now();
+        let found = solidify(&mesh, &options, &Monitor::default()).expect("it freezes");
+        let seconds = clock.elapsed().as_secs_f64();
+        let each = 1e9 * seconds / (found.cells * found.steps) as f64;
+        println!(
+            "{:>8} {:>5} {seconds:>8.1} {each:>7.1}",
+            found.cells, found.steps
+        );
+    }
+}

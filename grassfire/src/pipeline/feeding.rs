@@ -1,0 +1,460 @@
+//! The feeding edit: radii that grow towards the feeders, and the body that follows them.
+
+use super::ReconstructOptions;
+use super::bodies::Bodies;
+use super::error::{PipelineError, StageError};
+use super::record::Record;
+use super::shape::{Base, Shape};
+use crate::Vec3;
+use crate::casting::feed::{
+    self, Contact, Fed, FeedError, FeedGraph, FeedOn, FeedOptions, Monotony, area_factor, feed,
+    feed_graph, monotony,
+};
+use crate::edit::{apply_radii, cells_of, grow};
+use crate::fit::fit;
+use crate::medial::{self, MedialMesh};
+use crate::mesh::{Bvh, TriMesh, Winding};
+use crate::monitor::Monitor;
+use crate::radii;
+use crate::remesh::{Capsule, RemeshError, RemeshOptions, Remeshed, remesh, remesh_density};
+use crate::report::{FeedBlock, FeederBlock, InfeasibleBlock};
+use crate::skeleton;
+use crate::thicken::ThickenedBody;
+use crate::voxel::VoxelGrid;
+
+/// A skeleton point touches a body when the body is nearer than this many radii.
+const TOUCHES: f64 = 1.25;
+/// And belongs to it when it lies deeper in it than this many radii.
+const BELONGS: f64 = 0.5;
+/// A feeder stands on a body when that is nearer than this, mm, or than the feeder's radius.
+const STANDS: f64 = 1.0;
+
+/// Passes of smoothing that take the lattice's noise out of medial radii: every bump would be carried to the feeder.
+const SMOOTHING: usize = 4;
+/// Growth below this many voxels is left to the body's own radii.
+const LEAST_GROWTH: f64 = 0.5;
+
+/// Feeders may be given this far from the part, as a share of its diagonal: people point at a parting plane or a top face.
+const NEAR: f64 = 0.05;
+/// Feeders nearer than this many voxels stand on the part.
+const ON_PART: f64 = 1.0;
+
+/// The options with every feeder on the surface of the part.
+///
+/// # Errors
+/// [`FeedError::Outside`] for a feeder far from it.
+pub(super) fn placed(
+    options: &ReconstructOptions,
+    remeshed: &Remeshed,
+    monitor: &Monitor,
+) -> Result<ReconstructOptions, FeedError> {
+    feed::check(&options.feed)?;
+    let mut placed = options.clone();
+    let mesh = remeshed.solid.mesh();
+    let bvh = Bvh::new(mesh);
+    let diagonal = mesh.bounds().map_or(0.0, |(lo, hi)| (hi - lo).norm());
+    let limit = options.feed.feeder_radius.max(NEAR * diagonal);
+    for (feeder, at) in placed.feed.feeders.iter_mut().enumerate() {
+        let place = Vec3::from(*at);
+        let Some(nearest) = bvh.nearest(&place, f64::INFINITY) else {
+            return Err(FeedError::Empty);
+        };
+        let distance = nearest.distance;
+        if distance > limit {
+            return Err(FeedError::Outside {
+                feeder,
+                place,
+                distance,
+                limit,
+            });
+        }
+        if distance > ON_PART * remeshed.field.spacing {
+            *at = nearest.point.into();
+            let text = format!(
+                "the feeder given at ({:.1}, {:.1}, {:.1}) mm stands on the part at ({:.1}, {:.1}, {:.1}) mm, {distance:.1} mm away",
+                place.x, place.y, place.z, at[0], at[1], at[2]
+            );
+            monitor.warn("feed", text);
+        }
+    }
+    Ok(placed)
+}
+
+/// The proposal with sections that grow towards the feeders; none when nothing is to be fed or nothing has to grow.
+///
+/// 1. The least radii on the proposal's skeleton or medial axis ([`feed_graph`]).
+/// 2. The proposal's field moves outward by what they grew ([`grow`]); bores that stay free stay so.
+/// 3. The grown field is remeshed: where gaps close, the topology changes here and is known to all later stages.
+///
+/// What the skeleton of the grown proposal still asks for is done on the body ([`fed`]). Growing the field again and again
+/// instead was tried: junctions swell round after round until no body of the skeleton is sound.
+///
+/// Scaling the offsets of a finished body instead makes it cut itself wherever gaps close. The report gets what the
+/// skeleton of the proposal says before the edit.
+///
+/// # Errors
+/// As [`feed`], [`medial::medial_axis`] and [`remesh_density`].
+pub(super) fn edit(
+    record: &mut Record,
+    remeshed: &Remeshed,
+    bodies: &Bodies,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Option<Remeshed>, PipelineError> {
+    if !options.feed.active() {
+        return Ok(None);
+    }
+    let (fed, grown) = one_round(record, remeshed, bodies, options, monitor)?;
+    let added = grown
+        .as_ref()
+        .map_or(0.0, |grown| grown.solid.volume() - remeshed.solid.volume());
+    record.report.feed = Some(block(&fed, added, options));
+    Ok(grown)
+}
+
+/// What feeding says of a solid, and the solid grown by it when that is worth while.
+fn one_round(
+    record: &mut Record,
+    from: &Remeshed,
+    bodies: &Bodies,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<(Fed, Option<Remeshed>), PipelineError> {
+    let (feeding, voxel) = (&options.feed, from.field.spacing);
+    let mut axis = record.stage("medial", || {
+        medial::medial_axis(&from.field, &options.medial, monitor)
+    })?;
+    let skeleton = record.stage("skeleton", || {
+        let mut quads = skeleton::quad_skeleton(&axis.mesh, voxel, &options.skeleton, monitor)?;
+        radii::smooth(&mut quads.skeleton, options.radii.smoothing);
+        Ok::<_, StageError>(quads.skeleton)
+    })?;
+    record.stage("feed", || {
+        let (cells, before, fed) = match feeding.on {
+            FeedOn::Skeleton => {
+                let (points, radii) = (&skeleton.points, &skeleton.radii);
+                let contacts = contacts(bodies, points, radii, feeding, true);
+                let fed = feed(&skeleton, &contacts, feeding, monitor)?;
+                (cells_of(&skeleton), radii, fed)
+            }
+            FeedOn::Medial => {
+                smooth(&mut axis.mesh);
+                let (points, radii) = (&axis.mesh.points, &axis.mesh.radii);
+                let contacts = contacts(bodies, points, radii, feeding, true);
+                let graph = FeedGraph::of_medial(&axis.mesh, &contacts);
+                let fed = feed_graph(&graph, &[], &contacts, feeding, monitor)?;
+                (cells(&axis.mesh), radii, fed)
+            }
+        };
+        let growth: Vec<f64> = fed.radii.iter().zip(before).map(|(a, b)| a - b).collect();
+        let most = growth.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+        if most < LEAST_GROWTH * voxel {
+            return Ok((fed, None));
+        }
+        let mut field = grow(&from.field, from.solid.mesh(), &cells, &growth);
+        keep_free(&mut field, &bodies.bosses.free);
+        let grown = solid_of(field, bodies, options, monitor)?;
+        Ok::<_, StageError>((fed, Some(grown)))
+    })
+}
+
+/// Half-way to the mean of the neighbours, some times.
+fn smooth(mesh: &mut MedialMesh) {
+    let graph = FeedGraph::of_medial(mesh, &[]);
+    for _ in 0..SMOOTHING {
+        let mean = |v: usize| {
+            let around = graph.neighbours(v as u32);
+            let sum: f64 = around.iter().map(|n| mesh.radii[n.0 as usize]).sum();
+            let own = mesh.radii[v];
+            if around.is_empty() {
+                own
+            } else {
+                (own + sum / around.len() as f64) / 2.0
+            }
+        };
+        mesh.radii = (0..mesh.radii.len()).map(mean).collect();
+    }
+}
+
+/// Triangles of a medial mesh, its curves as triangles without area.
+fn cells(mesh: &MedialMesh) -> TriMesh {
+    let mut triangles = mesh.triangles.clone();
+    triangles.extend(mesh.edges.iter().map(|e| [e[0], e[1], e[1]]));
+    TriMesh {
+        points: mesh.points.clone(),
+        triangles,
+        tags: Vec::new(),
+    }
+}
+
+/// Takes the free lengths of bores out of a field.
+fn keep_free(field: &mut VoxelGrid<f32>, free: &[Capsule]) {
+    for v in 0..field.values.len() {
+        let [i, j, k] = field.ijk(v);
+        let p = field.centre(i, j, k);
+        let depth = free.iter().map(|bore| depth_in(bore, &p));
+        let depth = depth.fold(f64::NEG_INFINITY, f64::max);
+        field.values[v] = f64::from(field.values[v]).min(-depth) as f32;
+    }
+}
+
+/// Depth in the cylinder of a bore, mm, negative outside.
+fn depth_in(bore: &Capsule, p: &Vec3) -> f64 {
+    let axis = bore.b - bore.a;
+    let length = axis.norm();
+    if length <= 0.0 {
+        return f64::NEG_INFINITY;
+    }
+    let along = (p - bore.a).dot(&axis) / length;
+    let radial = (p - bore.a - axis * (along / length)).norm();
+    (bore.radius - radial).min(along).min(length - along)
+}
+
+/// The solid of a signed distance field.
+fn solid_of(
+    field: VoxelGrid<f32>,
+    bodies: &Bodies,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Remeshed, RemeshError> {
+    let h = field.spacing;
+    let mut on_grid = RemeshOptions {
+        voxel: Some(h),
+        ..options.remesh.clone()
+    };
+    on_grid.keep_open.extend(bodies.bosses.free.iter().copied());
+    // As a density: a half at the surface.
+    let density = VoxelGrid {
+        values: field.values.iter().map(|f| 0.5 + f / h as f32).collect(),
+        ..field
+    };
+    remesh_density(&density, 0.5, &on_grid, monitor)
+}
+
+/// The shape with the radii that feeding still asks for on its own skeleton; as it is when nothing is to be fed, or when
+/// the body with these radii would not be sound.
+///
+/// 1. The least radii ([`feed`]).
+/// 2. The target of the fit moves outward by what they grew ([`grow`]), the thickened body is scaled ([`apply_radii`]).
+/// 3. The scaled body is fitted to that target, which also untangles it.
+///
+/// # Errors
+/// As [`feed`] and [`fit`].
+pub(super) fn fed(
+    record: &mut Record,
+    shape: Shape,
+    base: &Base,
+    bodies: &Bodies,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Shape, PipelineError> {
+    let feeding = &options.feed;
+    if !feeding.active() {
+        return Ok(shape);
+    }
+    let before = &shape.skeleton.skeleton;
+    let quiet = Monitor::default();
+    let fed = record.stage("feed", || {
+        // In a design part the bodies are not part of the skeleton: members only run on into their walls.
+        let inside = base.united.is_none();
+        let contacts = contacts(bodies, &before.points, &before.radii, feeding, inside);
+        feed(before, &contacts, feeding, &quiet)
+    })?;
+    let growth = fed.radii.iter().zip(&before.radii).map(|(a, b)| a - b);
+    let growth: Vec<f64> = growth.collect();
+    let shortfall = growth.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+    let (body, target) = record.stage("feed", || {
+        let surface = base.remeshed.solid.mesh();
+        let target = grow(base.target, surface, &cells_of(before), &growth);
+        let mesh = apply_radii(&shape.body.mesh, &shape.body, before, &fed.radii)?;
+        let body = ThickenedBody {
+            mesh,
+            ..shape.body.clone()
+        };
+        Ok::<_, StageError>((body, target))
+    })?;
+    let mut skeleton = shape.skeleton.clone();
+    skeleton.skeleton.radii.clone_from(&fed.radii);
+    skeleton.stats = skeleton::stats(&skeleton.skeleton);
+    let fitted = record.stage("fit", || {
+        fit(&body, &skeleton.skeleton, &target, &options.fit, &quiet)
+    })?;
+    let added = fitted.volume - shape.fitted.volume;
+    let edited = Shape {
+        skeleton,
+        body,
+        fitted,
+        ..shape.clone()
+    };
+    let sound = edited.sound();
+    if let Some(block) = &mut record.report.feed {
+        block.violations = if sound {
+            fed.violations
+        } else {
+            fed.violations_before
+        };
+        block.shortfall = if sound { 0.0 } else { shortfall };
+        if sound {
+            block.added_volume += added;
+        }
+    }
+    if !sound {
+        let text = format!(
+            "the last {shortfall:.2} mm of growth on {} of {} edges of the skeleton were left out: the body would cut itself",
+            fed.violations_before, fed.rules
+        );
+        monitor.warn("feed", text);
+        return Ok(shape);
+    }
+    Ok(edited)
+}
+
+/// Far points whose ways to the feeders are looked at.
+const PATHS: usize = 20;
+/// Inscribed balls are known to this share of a voxel.
+const KNOWN: f64 = 0.5;
+
+/// Looks whether inscribed balls grow towards the feeders in the proposal and in the finished part, on medial axes of both.
+pub(super) fn prove(
+    record: &mut Record,
+    remeshed: &Remeshed,
+    part: &TriMesh,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<(), PipelineError> {
+    let feeding = &options.feed;
+    if feeding.feeders.is_empty() || record.report.feed.is_none() {
+        return Ok(());
+    }
+    let voxel = remeshed.field.spacing;
+    let of = |remeshed: &Remeshed| -> Result<Monotony, StageError> {
+        let axis = medial::medial_axis(&remeshed.field, &options.medial, monitor)?;
+        let reach = feeding.feeder_radius;
+        Ok(monotony(
+            &axis.mesh,
+            &feeding.feeders,
+            reach,
+            PATHS,
+            KNOWN * voxel,
+        ))
+    };
+    let looked = record.stage("feed", || {
+        let on_grid = RemeshOptions {
+            voxel: Some(voxel),
+            ..options.remesh.clone()
+        };
+        let finished = remesh(part, &on_grid, monitor)?;
+        Ok::<_, StageError>([of(remeshed)?, of(&finished)?])
+    });
+    let [before, after] = match looked {
+        Ok(looked) => looked,
+        Err(error) if error.is_cancelled() => return Err(error),
+        Err(error) => {
+            let text = format!(
+                "growth on the medial axis could not be measured: {}",
+                error.source
+            );
+            monitor.warn("feed", text);
+            return Ok(());
+        }
+    };
+    if let Some(block) = &mut record.report.feed {
+        block.falling_before = before;
+        block.falling = after;
+    }
+    Ok(())
+}
+
+/// How the bodies touch balls of a skeleton or medial axis, one contact a body.
+fn contacts(
+    bodies: &Bodies,
+    points: &[Vec3],
+    radii: &[f64],
+    options: &FeedOptions,
+    inside: bool,
+) -> Vec<Contact> {
+    let FeedOptions {
+        feeders,
+        feeder_radius,
+        ..
+    } = options;
+    let surface = &bodies.bosses.surface;
+    let count = surface.tags.iter().max().map_or(0, |n| n + 1);
+    let one = |number: u32| {
+        let all = surface.triangles.iter().zip(&surface.tags);
+        let mesh = TriMesh {
+            points: surface.points.clone(),
+            triangles: all.filter(|t| *t.1 == number).map(|t| *t.0).collect(),
+            tags: Vec::new(),
+        };
+        let bvh = Bvh::new(&mesh);
+        let winding = Winding::new(&bvh);
+        let depth = |p: &Vec3| {
+            let distance = bvh
+                .nearest(p, f64::INFINITY)
+                .map_or(f64::INFINITY, |n| n.distance);
+            if winding.at(p) > 0.5 {
+                distance
+            } else {
+                -distance
+            }
+        };
+        let depths = points.iter().map(&depth);
+        let depths: Vec<f64> = depths.collect();
+        let which = |wanted: &dyn Fn(f64, f64) -> bool| {
+            let each = depths.iter().zip(radii).enumerate();
+            let found = each.filter(|(_, (depth, radius))| wanted(**depth, **radius));
+            found.map(|(v, _)| v as u32).collect::<Vec<u32>>()
+        };
+        let reach = feeder_radius.max(STANDS);
+        let stands = |place: &&[f64; 3]| depth(&Vec3::from(**place)) >= -reach;
+        let feeders = feeders.iter().enumerate().filter(|f| stands(&f.1));
+        Contact {
+            touching: which(&|depth, radius| depth >= -TOUCHES * radius),
+            inside: if inside {
+                which(&|depth, radius| depth >= BELONGS * radius)
+            } else {
+                Vec::new()
+            },
+            feeders: feeders.map(|(number, _)| number as u32).collect(),
+        }
+    };
+    (0..count).map(one).collect()
+}
+
+fn block(fed: &Fed, added: f64, options: &ReconstructOptions) -> FeedBlock {
+    let feeders = fed.zones.iter().map(|zone| FeederBlock {
+        place: zone.feeder.into(),
+        points: zone.points,
+        reach: zone.reach,
+        limit: zone.limit,
+        modulus: zone.shape.modulus,
+        diameter: zone.size.diameter,
+        neck: zone.size.neck,
+        volume: zone.size.volume,
+    });
+    let infeasible = fed.infeasible.iter().map(|place| InfeasibleBlock {
+        place: place.place.into(),
+        wanted: place.wanted,
+        limit: place.most,
+        origin: place.origin.into(),
+        origin_radius: place.origin_radius,
+    });
+    FeedBlock {
+        feeders: options.feed.feeders.clone(),
+        growth: fed.slope,
+        k_area: area_factor(fed.slope),
+        rules: fed.rules,
+        violations_before: fed.violations_before,
+        violations: fed.violations,
+        shortfall: 0.0,
+        added_volume: added,
+        added_volume_skeleton: fed.added_volume,
+        casting_yield: fed.casting_yield,
+        falling_before: Monotony::default(),
+        falling: Monotony::default(),
+        sinks: fed.sinks.iter().map(|&p| p.into()).collect(),
+        zones: feeders.collect(),
+        infeasible: infeasible.collect(),
+    }
+}
