@@ -15,6 +15,7 @@ pub mod voxel;
 pub mod cad;
 pub mod casting;
 pub mod edit;
+pub mod fe;
 pub mod fit;
 pub mod io;
 pub mod medial;

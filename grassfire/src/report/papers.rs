@@ -206,6 +206,55 @@ pub const ALL: &[Paper] = &[
         stages: &["mould"],
         used_for: "a mould opens along a direction when every line along it meets the part in one interval",
     },
+    Paper {
+        key: "bendsoe1999",
+        citation: "M. P. Bendsoe, O. Sigmund (1999): Material interpolation schemes in topology optimization. Archive of Applied Mechanics 69.",
+        doi: "10.1007/s004190050248",
+        stages: &["optimize"],
+        used_for: "penalized densities",
+    },
+    Paper {
+        key: "bruns2001",
+        citation: "T. E. Bruns, D. A. Tortorelli (2001): Topology optimization of non-linear elastic structures and compliant mechanisms. Computer Methods in Applied Mechanics and Engineering 190.",
+        doi: "10.1016/S0045-7825(00)00278-4",
+        stages: &["optimize"],
+        used_for: "the density filter",
+    },
+    Paper {
+        key: "lazarov2011",
+        citation: "B. S. Lazarov, O. Sigmund (2011): Filters in topology optimization based on Helmholtz-type differential equations. International Journal for Numerical Methods in Engineering 86.",
+        doi: "10.1002/nme.3072",
+        stages: &["optimize"],
+        used_for: "the density filter for large radii",
+    },
+    Paper {
+        key: "wang2011",
+        citation: "F. Wang, B. S. Lazarov, O. Sigmund (2011): On projection methods, convergence and robust formulations in topology optimization. Structural and Multidisciplinary Optimization 43.",
+        doi: "10.1007/s00158-010-0602-y",
+        stages: &["optimize"],
+        used_for: "densities that are nearly 0 or 1",
+    },
+    Paper {
+        key: "svanberg1987",
+        citation: "K. Svanberg (1987): The method of moving asymptotes - a new method for structural optimization. International Journal for Numerical Methods in Engineering 24.",
+        doi: "10.1002/nme.1620240207",
+        stages: &["optimize"],
+        used_for: "the update of the variables",
+    },
+    Paper {
+        key: "bendsoe1989",
+        citation: "M. P. Bendsoe (1989): Optimal shape design as a material distribution problem. Structural Optimization 1.",
+        doi: "10.1007/BF01650949",
+        stages: &["optimize"],
+        used_for: "optimality criteria",
+    },
+    Paper {
+        key: "adams2003",
+        citation: "M. Adams, M. Brezina, J. Hu, R. Tuminaro (2003): Parallel multigrid smoothing: polynomial versus Gauss-Seidel. Journal of Computational Physics 188.",
+        doi: "10.1016/S0021-9991(03)00194-3",
+        stages: &["optimize"],
+        used_for: "the smoother of the multigrid solver",
+    },
 ];
 
 /// The papers behind `stages`, in the order of [`ALL`].

@@ -1,0 +1,123 @@
+//! The coarsest level, solved directly.
+
+use faer::linalg::solvers::Solve;
+use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::sparse::{SparseColMat, Triplet};
+use faer::{Mat, Side};
+
+use super::FeError;
+use super::galerkin::corner;
+use super::grid::NodeGrid;
+
+/// Added to the diagonal, relative: where most of a coarse element is fixed, its matrix is singular.
+const SHIFT: f64 = 1e-9;
+
+/// A factored coarse matrix.
+pub(super) struct Coarse {
+    /// Place in the level's fields of every unknown.
+    unknowns: Vec<u32>,
+    /// Unknown of component 0 of every node `[z][y][x]`; the others follow it.
+    numbers: Vec<u32>,
+    symbolic: Option<SymbolicLlt<usize>>,
+    factor: Option<Llt<usize, f64>>,
+    right: Mat<f64>,
+}
+
+impl Coarse {
+    /// Numbers the nodes of the elements that hold stiffness.
+    pub fn new(grid: &NodeGrid, occupied: &[bool]) -> Self {
+        let n = grid.n;
+        let nodes = [n[0] + 1, n[1] + 1, n[2] + 1];
+        let mut used = vec![false; nodes[0] * nodes[1] * nodes[2]];
+        for (i, _) in occupied.iter().enumerate().filter(|(_, full)| **full) {
+            let at = [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])];
+            for a in 0..8 {
+                let [x, y, z] = corner(at, a);
+                used[(z * nodes[1] + y) * nodes[0] + x] = true;
+            }
+        }
+        let mut unknowns = Vec::new();
+        let mut numbers = vec![u32::MAX; used.len()];
+        for (i, _) in used.iter().enumerate().filter(|(_, used)| **used) {
+            numbers[i] = unknowns.len() as u32;
+            let at = grid.node(
+                i % nodes[0],
+                i / nodes[0] % nodes[1],
+                i / (nodes[0] * nodes[1]),
+            );
+            unknowns.extend((0..3).map(|c| (at + c * grid.sx) as u32));
+        }
+        let right = Mat::zeros(unknowns.len(), 1);
+        Self {
+            unknowns,
+            numbers,
+            symbolic: None,
+            factor: None,
+            right,
+        }
+    }
+
+    /// Assembles and factors.
+    pub fn factor(
+        &mut self,
+        grid: &NodeGrid,
+        elements: &[([usize; 3], [[f64; 24]; 24])],
+    ) -> Result<(), FeError> {
+        let failed = |what: String| FeError::Factor {
+            unknowns: self.unknowns.len(),
+            what,
+        };
+        let size = self.unknowns.len();
+        let mut triplets = Vec::with_capacity(elements.len() * 300 + size);
+        let mut diagonal = vec![0.0; size];
+        for (at, k) in elements {
+            let dofs: [usize; 24] = std::array::from_fn(|i| {
+                let [x, y, z] = corner(*at, i / 3);
+                let node = (z * (grid.n[1] + 1) + y) * (grid.n[0] + 1) + x;
+                self.numbers[node] as usize + i % 3
+            });
+            for i in 0..24 {
+                diagonal[dofs[i]] += k[i][i];
+                for j in 0..24 {
+                    if dofs[i] >= dofs[j] {
+                        triplets.push(Triplet::new(dofs[i], dofs[j], k[i][j]));
+                    }
+                }
+            }
+        }
+        let largest = diagonal.iter().fold(0.0, |m: f64, &v| m.max(v));
+        for (i, &d) in diagonal.iter().enumerate() {
+            // A degree of freedom without stiffness stays where it is.
+            let add = if d <= 1e-14 * largest {
+                largest
+            } else {
+                SHIFT * d
+            };
+            triplets.push(Triplet::new(i, i, add));
+        }
+        let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(size, size, &triplets)
+            .map_err(|e| failed(format!("{e:?}")))?;
+        let symbolic = match &self.symbolic {
+            Some(symbolic) => symbolic.clone(),
+            None => SymbolicLlt::try_new(matrix.symbolic(), Side::Lower)
+                .map_err(|e| failed(format!("{e:?}")))?,
+        };
+        let factor = Llt::try_new_with_symbolic(symbolic.clone(), matrix.as_ref(), Side::Lower)
+            .map_err(|e| failed(format!("{e:?}")))?;
+        self.symbolic = Some(symbolic);
+        self.factor = Some(factor);
+        Ok(())
+    }
+
+    /// Solves for the right side `b`; `x` is written at the unknowns only.
+    pub fn solve(&mut self, b: &[f32], x: &mut [f32]) {
+        let Some(factor) = &self.factor else { return };
+        for (i, &at) in self.unknowns.iter().enumerate() {
+            self.right[(i, 0)] = f64::from(b[at as usize]);
+        }
+        factor.solve_in_place(&mut self.right);
+        for (i, &at) in self.unknowns.iter().enumerate() {
+            x[at as usize] = self.right[(i, 0)] as f32;
+        }
+    }
+}

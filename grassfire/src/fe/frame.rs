@@ -1,0 +1,75 @@
+//! What all operators of one problem share: the finest grid and its fixed degrees of freedom.
+
+use std::collections::HashMap;
+
+use super::grid::NodeGrid;
+
+/// The finest grid, its fixed degrees of freedom, and which blocks of nodes touch stiffness.
+pub(super) struct Frame {
+    pub grid: NodeGrid,
+    /// Places in a node field, ascending.
+    pub fixed: Vec<u32>,
+    /// See [`super::matrix_free::active_blocks`].
+    pub active: Vec<bool>,
+    /// By place of the element: bit `3 corner + component` is set where fixed.
+    masks: HashMap<usize, u32>,
+    /// The elements of `masks`, ascending.
+    masked: Vec<[usize; 3]>,
+    rows: Vec<bool>,
+}
+
+impl Frame {
+    /// `fixed`: (node, component) pairs; doubles are allowed.
+    pub fn new(grid: NodeGrid, fixed: &[([usize; 3], usize)]) -> Self {
+        let n = grid.n;
+        let mut places: Vec<u32> = fixed
+            .iter()
+            .map(|&([x, y, z], c)| (grid.node(x, y, z) + c * grid.sx) as u32)
+            .collect();
+        places.sort_unstable();
+        places.dedup();
+        let mut masks: HashMap<usize, u32> = HashMap::new();
+        let mut masked = Vec::new();
+        let mut rows = vec![false; n[1] * n[2]];
+        for &(node, c) in fixed {
+            for corner in 0..8 {
+                let below = |d: usize| node[d].checked_sub(corner >> d & 1).filter(|&i| i < n[d]);
+                let (Some(x), Some(y), Some(z)) = (below(0), below(1), below(2)) else {
+                    continue;
+                };
+                let mask = masks.entry(grid.element(x, y, z)).or_insert_with(|| {
+                    masked.push([x, y, z]);
+                    0
+                });
+                *mask |= 1 << (3 * corner + c);
+                rows[z * n[1] + y] = true;
+            }
+        }
+        masked.sort_unstable();
+        Self {
+            grid,
+            fixed: places,
+            active: Vec::new(),
+            masks,
+            masked,
+            rows,
+        }
+    }
+
+    /// All elements with fixed corners, in order.
+    pub fn masks(&self) -> impl Iterator<Item = ([usize; 3], u32)> + '_ {
+        self.masked
+            .iter()
+            .map(|&[x, y, z]| ([x, y, z], self.mask(self.grid.element(x, y, z))))
+    }
+
+    #[inline]
+    pub fn mask(&self, element: usize) -> u32 {
+        self.masks.get(&element).copied().unwrap_or(0)
+    }
+
+    #[inline]
+    pub fn row_has_masks(&self, y: usize, z: usize) -> bool {
+        self.rows[z * self.grid.n[1] + y]
+    }
+}

@@ -1,0 +1,298 @@
+//! Galerkin coarse operators straight from the moduli of the finest grid.
+//!
+//! A coarse element is the sum over its fine elements of `E_i M_i` with `M_i = P_i' K0 P_i`, where `P_i` interpolates the
+//! corners of the coarse element to those of fine element `i`: `8^level` tables of 300 numbers, no element matrices.
+//! Fixed degrees of freedom drop out of `P_i`, so they exist on the finest grid only. Averaged moduli instead need two to
+//! four times the iterations on optimized designs.
+
+use std::collections::{BTreeSet, HashMap};
+use std::ops::{AddAssign, Mul};
+
+use pulp::Arch;
+use rayon::prelude::*;
+
+use super::frame::Frame;
+use super::grid::{BLOCK, NodeGrid};
+use super::matrix_free::Float;
+use super::stencil::{EMPTY, STRIDE, Stencil};
+
+/// Length of a table: the upper triangle of 24x24, padded.
+const TABLE: usize = 304;
+
+/// Place of entry (i, j) in a table.
+const fn upper(i: usize, j: usize) -> usize {
+    let (i, j) = if i <= j { (i, j) } else { (j, i) };
+    i * 24 + j - i * (i + 1) / 2
+}
+
+/// The tables of one level.
+pub(super) struct Tables<T> {
+    level: usize,
+    /// Of every child without fixed corners.
+    plain: Vec<T>,
+    /// Of children with fixed degrees of freedom, by mask and child.
+    special: HashMap<(u32, u32), Vec<T>>,
+}
+
+impl<T: Float + Mul<Output = T> + AddAssign> Tables<T> {
+    pub fn new(stiffness: &[[f64; 24]; 24], level: usize, frame: &Frame) -> Self {
+        let children = 1usize << (3 * level);
+        let table = |child: usize, mask: u32| -> Vec<T> {
+            let m = triple_product(stiffness, level, child, mask);
+            m.iter().map(|&v| T::of(v)).collect()
+        };
+        let plain: Vec<Vec<T>> = (0..children).into_par_iter().map(|i| table(i, 0)).collect();
+        let side = (1usize << level) - 1;
+        let child = |at: [usize; 3]| {
+            ((((at[2] & side) << level) + (at[1] & side)) << level) + (at[0] & side)
+        };
+        let keys: BTreeSet<(u32, u32)> = frame
+            .masks()
+            .map(|(at, mask)| (mask, child(at) as u32))
+            .collect();
+        let special = keys
+            .into_par_iter()
+            .map(|(mask, child)| ((mask, child), table(child as usize, mask)))
+            .collect::<Vec<_>>();
+        Self {
+            level,
+            plain: plain.concat(),
+            special: special.into_iter().collect(),
+        }
+    }
+
+    /// Adds up the matrix of a coarse element; false when it has no stiffness.
+    #[inline(always)]
+    fn element(&self, frame: &Frame, e: &[T], at: [usize; 3], sum: &mut [T; TABLE]) -> bool {
+        let side = 1usize << self.level;
+        let mut any = false;
+        let mut child = 0;
+        for z in 0..side {
+            for y in 0..side {
+                let (fy, fz) = (at[1] * side + y, at[2] * side + z);
+                let first = frame.grid.element(at[0] * side, fy, fz);
+                let has_masks = frame.row_has_masks(fy, fz);
+                for x in 0..side {
+                    let modulus = e[first + x];
+                    if modulus != T::default() {
+                        if !any {
+                            sum.fill(T::default());
+                            any = true;
+                        }
+                        let mask = if has_masks { frame.mask(first + x) } else { 0 };
+                        let table = self.table(mask, child);
+                        for (s, &t) in sum.iter_mut().zip(table) {
+                            *s += modulus * t;
+                        }
+                    }
+                    child += 1;
+                }
+            }
+        }
+        any
+    }
+
+    #[inline(always)]
+    fn table(&self, mask: u32, child: usize) -> &[T] {
+        if mask == 0 {
+            return &self.plain[child * TABLE..(child + 1) * TABLE];
+        }
+        // Every mask of the frame has its table.
+        self.special
+            .get(&(mask, child as u32))
+            .map_or(&self.plain[..TABLE], |t| &t[..])
+    }
+}
+
+/// Upper triangle of `P' K P` for a child of a coarse element; masked degrees of freedom are fixed.
+fn triple_product(k: &[[f64; 24]; 24], level: usize, child: usize, mask: u32) -> [f64; TABLE] {
+    let side = 1usize << level;
+    let at = [child % side, child / side % side, child / (side * side)];
+    let mut p = [[0.0; 8]; 8];
+    for (j, row) in p.iter_mut().enumerate() {
+        for (a, weight) in row.iter_mut().enumerate() {
+            *weight = (0..3)
+                .map(|d| {
+                    let t = (at[d] + (j >> d & 1)) as f64 / side as f64;
+                    if a >> d & 1 == 1 { t } else { 1.0 - t }
+                })
+                .product();
+        }
+    }
+    let free = |dof: usize| mask >> dof & 1 == 0;
+    // K P, then P' of it.
+    let mut kp = [[0.0; 24]; 24];
+    for (i, row) in kp.iter_mut().enumerate() {
+        for m in (0..24).filter(|&m| free(m)) {
+            for a in 0..8 {
+                row[3 * a + m % 3] += k[i][m] * p[m / 3][a];
+            }
+        }
+    }
+    let mut out = [0.0; TABLE];
+    for m in (0..24).filter(|&m| free(m)) {
+        for (a, &weight) in p[m / 3].iter().enumerate() {
+            let i = 3 * a + m % 3;
+            for j in i..24 {
+                out[upper(i, j)] += weight * kp[m][j];
+            }
+        }
+    }
+    out
+}
+
+/// Numbers the stored blocks of a coarse grid: those that touch an element in which the finest grid has stiffness.
+pub(super) fn places(frame: &Frame, level: usize, grid: &NodeGrid, e: &[f32]) -> Vec<u32> {
+    let full = occupied(frame, level, grid, e);
+    let n = grid.n;
+    let mut next = 0;
+    let mut out = Vec::with_capacity((n[2] + 1) * (n[1] + 1) * grid.blocks());
+    for z in 0..=n[2] {
+        for y in 0..=n[1] {
+            for b in 0..grid.blocks() {
+                let near = |i: usize, last: usize| i.saturating_sub(1)..(i + 1).min(last);
+                let xs = (b * BLOCK).saturating_sub(1)..((b + 1) * BLOCK).min(n[0]);
+                let any = near(z, n[2]).any(|z| {
+                    near(y, n[1]).any(|y| xs.clone().any(|x| full[(z * n[1] + y) * n[0] + x]))
+                });
+                out.push(if any { next } else { EMPTY });
+                next += u32::from(any);
+            }
+        }
+    }
+    out
+}
+
+/// Which elements of a coarse grid hold stiffness.
+pub(super) fn occupied(frame: &Frame, level: usize, grid: &NodeGrid, e: &[f32]) -> Vec<bool> {
+    let n = grid.n;
+    let side = 1usize << level;
+    let plane = |z: usize| {
+        let mut out = vec![false; n[0] * n[1]];
+        for fz in z * side..(z + 1) * side {
+            for fy in 0..n[1] * side {
+                let first = frame.grid.element(0, fy, fz);
+                let row = &e[first..first + n[0] * side];
+                let flags = &mut out[fy / side * n[0]..][..n[0]];
+                for (flag, children) in flags.iter_mut().zip(row.chunks_exact(side)) {
+                    *flag |= children.iter().any(|&v| v != 0.0);
+                }
+            }
+        }
+        out
+    };
+    let planes: Vec<Vec<bool>> = (0..n[2]).into_par_iter().map(plane).collect();
+    planes.concat()
+}
+
+/// Fills the stencil of a coarse grid from the moduli `e` of the finest one.
+pub(super) fn fill(
+    frame: &Frame,
+    grid: &NodeGrid,
+    tables: &Tables<f32>,
+    e: &[f32],
+    stencil: &mut Stencil,
+) {
+    let flags = grid.blocks() * (grid.n[1] + 1);
+    let planes = grid.n[2] + 1;
+    // Each slab computes one layer of elements that its neighbour computes too.
+    let slab = planes.div_ceil(4).clamp(2, 16);
+    let mut rest = &mut stencil.values[..];
+    let mut slabs = Vec::new();
+    for z in (0..planes).step_by(slab) {
+        let end = (z + slab).min(planes);
+        let places = &stencil.places[z * flags..end * flags];
+        let stored = places.iter().filter(|&&p| p != EMPTY).count();
+        let (mine, others) = rest.split_at_mut(stored * STRIDE);
+        slabs.push((z, end, places, mine));
+        rest = others;
+    }
+    slabs.into_par_iter().for_each(|(z, end, places, values)| {
+        values.fill(0.0);
+        let slab = Slab {
+            grid,
+            first: z,
+            end,
+            offset: places.iter().copied().find(|&p| p != EMPTY).unwrap_or(0),
+            places,
+        };
+        Arch::new().dispatch(|| slab.fill(frame, tables, e, values));
+    });
+}
+
+/// Some planes of nodes of a stencil.
+struct Slab<'a> {
+    grid: &'a NodeGrid,
+    first: usize,
+    end: usize,
+    places: &'a [u32],
+    offset: u32,
+}
+
+impl Slab<'_> {
+    #[inline(always)]
+    fn fill(&self, frame: &Frame, tables: &Tables<f32>, e: &[f32], values: &mut [f32]) {
+        let n = self.grid.n;
+        let mut sum = [0f32; TABLE];
+        for z in self.first.saturating_sub(1)..self.end.min(n[2]) {
+            for y in 0..n[1] {
+                for x in 0..n[0] {
+                    if tables.element(frame, e, [x, y, z], &mut sum) {
+                        self.scatter([x, y, z], &sum, values);
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn scatter(&self, at: [usize; 3], sum: &[f32; TABLE], values: &mut [f32]) {
+        for a in 0..8 {
+            let [x, y, z] = corner(at, a);
+            if z < self.first || z >= self.end {
+                continue;
+            }
+            let block =
+                ((z - self.first) * (self.grid.n[1] + 1) + y) * self.grid.blocks() + x / BLOCK;
+            let place = (self.places[block] - self.offset) as usize;
+            let values = &mut values[place * STRIDE + x % BLOCK..];
+            for j in 0..8 {
+                let step = |d: usize| (j >> d & 1) + 1 - (a >> d & 1);
+                let neighbour = (step(2) * 3 + step(1)) * 3 + step(0);
+                for r in 0..3 {
+                    for c in 0..3 {
+                        let to = (neighbour * 9 + r * 3 + c) * BLOCK;
+                        values[to] += sum[upper(3 * a + r, 3 * j + c)];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Corner `a` of an element.
+pub(super) fn corner(at: [usize; 3], a: usize) -> [usize; 3] {
+    [at[0] + (a & 1), at[1] + (a >> 1 & 1), at[2] + (a >> 2)]
+}
+
+/// The full matrices of all coarse elements with stiffness, for a direct solver.
+pub(super) fn elements(
+    frame: &Frame,
+    grid: &NodeGrid,
+    tables: &Tables<f64>,
+    e: &[f64],
+) -> Vec<([usize; 3], [[f64; 24]; 24])> {
+    let n = grid.n;
+    let all: Vec<Option<_>> = (0..n[0] * n[1] * n[2])
+        .into_par_iter()
+        .map(|i| {
+            let at = [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])];
+            let mut sum = [0f64; TABLE];
+            tables.element(frame, e, at, &mut sum).then(|| {
+                let full = std::array::from_fn(|i| std::array::from_fn(|j| sum[upper(i, j)]));
+                (at, full)
+            })
+        })
+        .collect();
+    all.into_iter().flatten().collect()
+}
