@@ -30,6 +30,10 @@ pub enum Command {
     /// Turns a mesh or a density into a STEP solid and a report
     #[command(after_help = RECONSTRUCT_EXAMPLES)]
     Reconstruct(Box<ReconstructArgs>),
+    /// Optimizes the topology of a project file
+    Optimize(Box<CaseArgs>),
+    /// Checks a project file and lists what its selections hold
+    Check(Box<CheckArgs>),
     /// Computes how a solid freezes in sand: hot spots, feeding, Niyama's criterion
     #[command(after_help = SOLIDIFY_EXAMPLES)]
     Solidify(SolidifyArgs),
@@ -39,7 +43,11 @@ pub enum Command {
     /// Runs everything on a built-in example
     Demo(DemoArgs),
     /// Prints the JSON Schema of all options (the keys of --set)
-    Schema,
+    Schema {
+        /// Of which command
+        #[arg(value_enum, default_value = "reconstruct")]
+        of: SchemaOf,
+    },
     /// Prints the version, and with --cite the papers behind it
     About(AboutArgs),
     /// Prints a completion script for a shell
@@ -150,6 +158,43 @@ pub struct ReconstructArgs {
     /// Folder for the results; made when missing
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
+    /// What all runs share.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// Whose options the schema describes.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum SchemaOf {
+    /// The options of `reconstruct`
+    Reconstruct,
+    /// The project file
+    Case,
+}
+
+/// Arguments of `optimize`.
+#[derive(Debug, Args)]
+pub struct CaseArgs {
+    /// Project file (TOML)
+    #[arg(value_name = "CASE")]
+    pub case: PathBuf,
+    /// Folder for the results; made when missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Go on from the state that an earlier run saved there (optimize.save_every)
+    #[arg(long)]
+    pub resume: bool,
+    /// What all runs share.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// Arguments of `check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Project file (TOML)
+    #[arg(value_name = "CASE")]
+    pub case: PathBuf,
     /// What all runs share.
     #[command(flatten)]
     pub run: RunArgs,

@@ -2,6 +2,7 @@
 
 mod about;
 mod args;
+mod case;
 mod failure;
 mod progress;
 mod run;
@@ -12,9 +13,10 @@ use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
+use grassfire::case::Case;
 use grassfire::pipeline::ReconstructOptions;
 
-use args::{Cli, Command};
+use args::{Cli, Command, SchemaOf};
 use failure::Failure;
 
 fn main() -> ExitCode {
@@ -37,7 +39,9 @@ fn dispatch(command: &Command) -> Result<u8, Failure> {
         Command::Solidify(args) => return run::solidify_command(args),
         Command::Mould(args) => return run::mould_command(args),
         Command::Demo(args) => return run::demo_command(args),
-        Command::Schema => run::print(&schema()?),
+        Command::Optimize(args) => return case::optimize_command(args),
+        Command::Check(args) => return case::check_command(args),
+        Command::Schema { of } => run::print(&schema(*of)?),
         Command::About(args) => run::print(&about::text(args.cite)),
         Command::Completions { shell } => {
             clap_complete::generate(
@@ -58,8 +62,11 @@ fn dispatch(command: &Command) -> Result<u8, Failure> {
     Ok(0)
 }
 
-fn schema() -> Result<String, Failure> {
-    let schema = schemars::schema_for!(ReconstructOptions);
+fn schema(of: SchemaOf) -> Result<String, Failure> {
+    let schema = match of {
+        SchemaOf::Reconstruct => schemars::schema_for!(ReconstructOptions),
+        SchemaOf::Case => schemars::schema_for!(Case),
+    };
     let text = serde_json::to_string_pretty(&schema);
     text.map(|text| text + "\n")
         .map_err(|e| Failure::usage(format!("cannot write the schema: {e}"), None))

@@ -164,7 +164,8 @@ fn unpack(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, Failure> {
     Ok(path)
 }
 
-fn command_line() -> String {
+/// The command line as it stands in the report.
+pub fn command_line() -> String {
     std::env::args_os()
         .map(|arg| arg.to_string_lossy().into_owned())
         .enumerate()
@@ -199,8 +200,8 @@ fn options(short: &[(&str, String)], args: &RunArgs) -> Result<ReconstructOption
     Ok(options)
 }
 
-/// Does `work` with progress, warnings and Ctrl-C, and says how it went.
-fn run(
+/// Runs `work` with threads, progress and Ctrl-C set up, and says how it went.
+pub fn run(
     threads: usize,
     output: &Path,
     args: &RunArgs,

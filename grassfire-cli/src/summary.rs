@@ -8,6 +8,24 @@ use grassfire::report::Report;
 /// Sizes, verdicts and where the files lie.
 pub fn text(report: &Report, output: &Path) -> String {
     let mut lines: Vec<(&str, String)> = Vec::new();
+    if let Some(block) = &report.optimize {
+        let end = if block.converged {
+            ""
+        } else {
+            ", at the limit"
+        };
+        lines.push((
+            "optimize",
+            format!(
+                "{} voxels, {} iterations{end}, compliance {:.6} N mm from {:.6}, grayness {:.3}",
+                block.elements,
+                block.iterations,
+                block.compliance,
+                block.first_compliance,
+                block.grayness
+            ),
+        ));
+    }
     if let Some(block) = &report.remesh {
         let topology = match block.changes.len() {
             0 => String::new(),
@@ -62,8 +80,10 @@ pub fn text(report: &Report, output: &Path) -> String {
         ));
     }
     lines.extend(casting(report));
-    let met = report.checks.iter().filter(|check| check.met).count();
-    lines.push(("checks", format!("{met} of {} met", report.checks.len())));
+    if !report.checks.is_empty() {
+        let met = report.checks.iter().filter(|check| check.met).count();
+        lines.push(("checks", format!("{met} of {} met", report.checks.len())));
+    }
     for check in report.checks.iter().filter(|check| !check.met) {
         let value = check
             .value
@@ -91,6 +111,7 @@ pub fn text(report: &Report, output: &Path) -> String {
         lines.push(("time", format!("{seconds:.1} s, {memory:.0} MB")));
     }
     for name in [
+        "density.vti",
         "part.step",
         "solidification.vti",
         "repaired.stl",

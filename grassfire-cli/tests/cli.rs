@@ -52,6 +52,10 @@ fn help_names_the_commands() {
 
     Commands:
       reconstruct  Turns a mesh or a density into a STEP solid and a report
+      optimize     Optimizes the topology of a project file
+      check        Checks a project file and lists what its selections hold
+      solidify     Computes how a solid freezes in sand: hot spots, feeding, Niyama's criterion
+      mould        Looks at how a solid leaves its mould: undercuts, parting, draft, walls
       demo         Runs everything on a built-in example
       schema       Prints the JSON Schema of all options (the keys of --set)
       about        Prints the version, and with --cite the papers behind it
@@ -100,6 +104,12 @@ fn reconstruct_help_is_complete() {
           --format <FORMAT>      Files to write besides part.step and part.stl; may be repeated or a
                                  comma list (files.formats) [possible values: step, brep, iges, 3mf,
                                  pieces]
+          --feeder <X,Y,Z>       Where a feeder stands, mm: sections grow towards it; may be repeated
+                                 (feed.feeders)
+          --growth <G>           How much sections grow towards the feeders, radius a length
+                                 (feed.growth)
+          --draw <DX,DY,DZ>      Draw direction of the mould: the finished part is looked at along it
+                                 (mould.draw, feed.draw)
           --strict               Refuse a mesh that needs repair (repair.strict)
       -o, --output <DIR>         Folder for the results; made when missing
           --set <KEY=VALUE>      Sets any option, such as remesh.min_tunnel=0; may be repeated

@@ -13,6 +13,7 @@ pub mod topology;
 pub mod voxel;
 
 pub mod cad;
+pub mod case;
 pub mod casting;
 pub mod edit;
 pub mod fe;
@@ -27,6 +28,7 @@ pub mod report;
 pub mod skeleton;
 pub mod spline;
 pub mod thicken;
+pub mod topopt;
 
 /// A point or a vector in millimetres.
 pub type Vec3 = nalgebra::Vector3<f64>;

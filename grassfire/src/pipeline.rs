@@ -13,6 +13,7 @@ mod fewest;
 mod illustrate;
 mod inputs;
 mod measure;
+mod optimize;
 mod recognise;
 mod record;
 mod shape;
@@ -27,6 +28,7 @@ use serde::{Deserialize, Serialize};
 pub use casting::{SolidJob, mould_solid, solidify_solid};
 pub use error::{PipelineError, StageError};
 pub use exchange::{FileOptions, Format};
+pub use optimize::{OptimizeJob, check_case, optimize};
 pub use shape::RetryOptions;
 
 use crate::cad::{CadOptions, NonDesignOptions, StepOptions};

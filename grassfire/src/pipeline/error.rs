@@ -3,10 +3,12 @@
 use std::path::PathBuf;
 
 use crate::cad::CadError;
+use crate::case::CaseError;
 use crate::casting::feed::FeedError;
 use crate::casting::mould::MouldError;
 use crate::casting::solidify::SolidifyError;
 use crate::edit::EditError;
+use crate::fe::FeError;
 use crate::fit::FitError;
 use crate::io::IoError;
 use crate::medial::MedialError;
@@ -17,6 +19,7 @@ use crate::report::ReportError;
 use crate::skeleton::SkeletonError;
 use crate::spline::SplineError;
 use crate::thicken::ThickenError;
+use crate::topopt::TopoptError;
 
 /// A run that could not go on.
 #[derive(Debug, thiserror::Error)]
@@ -65,6 +68,10 @@ pub enum StageError {
     Cad(#[from] CadError),
     #[error(transparent)]
     Report(#[from] ReportError),
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    #[error(transparent)]
+    Topopt(#[from] TopoptError),
     #[error("{} is a STEP file; the proposal must be a mesh or a density", path.display())]
     StepProposal { path: PathBuf },
     #[error("{} holds densities; a non-design body must be a STEP solid or a closed mesh", path.display())]
@@ -102,7 +109,13 @@ impl PipelineError {
             StageError::Feed(_) => 2,
             StageError::Solidify(SolidifyError::NotFrozen { .. }) => 3,
             StageError::Solidify(_) | StageError::Mould(_) => 2,
-            _ if matches!(self.stage, "options" | "read" | "non_design" | "recognise") => 2,
+            _ if matches!(
+                self.stage,
+                "options" | "case" | "read" | "non_design" | "recognise"
+            ) =>
+            {
+                2
+            }
             _ => 3,
         }
     }
@@ -125,6 +138,8 @@ impl PipelineError {
             StageError::Spline(e) => e.hint(),
             StageError::Cad(e) => e.hint(),
             StageError::Report(e) => e.hint(),
+            StageError::Case(e) => e.hint(),
+            StageError::Topopt(e) => e.hint(),
             StageError::StepProposal { .. } => {
                 Some("give the optimization result, and this file with --non-design".into())
             }
@@ -161,6 +176,10 @@ impl PipelineError {
                 | StageError::Fit(FitError::Cancelled(_))
                 | StageError::Spline(SplineError::Cancelled(_))
                 | StageError::Cad(CadError::Cancelled(_))
+                | StageError::Case(CaseError::Cancelled(_))
+                | StageError::Topopt(
+                    TopoptError::Cancelled(_) | TopoptError::Fe(FeError::Cancelled(_))
+                )
         )
     }
 }

@@ -162,6 +162,7 @@ pub(super) fn fingerprints(
     paths.map(|path| fingerprint(path, monitor)).collect()
 }
 
+/// Name and SHA-256 of a file.
 pub(super) fn fingerprint(path: &Path, monitor: &Monitor) -> Result<InputFile, StageError> {
     monitor.check()?;
     let bytes = std::fs::read(path).map_err(|source| IoError::Open {

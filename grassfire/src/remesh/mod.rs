@@ -136,6 +136,24 @@ pub fn remesh_density(
     remesh_on(&mesh, Some(density.spacing), options, monitor)
 }
 
+/// The closed surface `density = iso` of a density grid, as it is: no clean-up, no smoothing.
+///
+/// The outside of the grid is empty, so that full border voxels end at their outer faces; the surface is a manifold.
+///
+/// # Errors
+/// As [`remesh_density`].
+pub fn iso_surface(
+    density: &VoxelGrid<f32>,
+    iso: f64,
+    options: &RemeshOptions,
+    monitor: &Monitor,
+) -> Result<TriMesh, RemeshError> {
+    let mut padded = density::padded(density, iso, options, monitor)?;
+    let mut set = VoxelSet::positive(padded.dims, &padded.values);
+    compose::separate_opposite_empties(&mut padded, &mut set);
+    usable(&extract::surface(&padded, &set, false).mesh)
+}
+
 fn check(options: &RemeshOptions) -> Result<(), RemeshError> {
     let bad = |name, value, wanted| {
         Err(RemeshError::BadOption {

@@ -53,6 +53,9 @@ pub struct Report {
     /// The non-design bodies.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub non_design: Vec<NonDesignBlock>,
+    /// The topology optimization.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub optimize: Option<OptimizeBlock>,
     /// Surfaces and bosses that were recognised in the proposal.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub candidates: Vec<CandidateBlock>,
@@ -334,6 +337,49 @@ pub struct VolumeBlock {
     pub solid: f64,
     /// (solid - proposal) / proposal.
     pub relative_difference: f64,
+}
+
+/// The topology optimization.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct OptimizeBlock {
+    /// Voxels of the design space with its non-design bodies.
+    pub elements: usize,
+    /// Voxels of the whole grid.
+    pub grid: [usize; 3],
+    /// Edge of a voxel, mm.
+    pub voxel: f64,
+    /// Iterations.
+    pub iterations: usize,
+    /// It ended by itself, not at the limit of iterations.
+    pub converged: bool,
+    /// Volume of the densities over that of the space.
+    pub volume_fraction: f64,
+    /// Volume of the full voxels, mm3.
+    pub volume: f64,
+    /// f'u over the weighted cases in the first iteration, N mm.
+    pub first_compliance: f64,
+    /// The same in the last iteration.
+    pub compliance: f64,
+    /// f'u of every case in the last iteration, N mm.
+    pub case_compliance: Vec<f64>,
+    /// `4 mean(rho (1 - rho))`.
+    pub grayness: f64,
+    /// Mean change of density in the last iteration.
+    pub change: f64,
+    /// Mean wall time of an iteration.
+    pub seconds_per_iteration: f64,
+    /// Mean iterations of the solver, a case.
+    pub solver_iterations: f64,
+    /// Solutions for which the smallest modulus had to be raised.
+    pub fallbacks: usize,
+    /// Density above which a voxel counts as full.
+    pub threshold: f64,
+    /// Pieces of the full voxels.
+    pub components: usize,
+    /// Volume of the full voxels that a mould could not leave, mm3.
+    pub undercut_volume: f64,
+    /// Largest difference of densities across the planes of symmetry.
+    pub symmetry_error: f64,
 }
 
 /// One non-design body.

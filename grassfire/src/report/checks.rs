@@ -83,6 +83,28 @@ pub fn judge(report: &Report, limits: &Limits) -> Vec<Check> {
     solid(report, limits, &mut checks);
     fidelity(report, limits, &mut checks);
     super::casting::judge(report, limits, &mut checks);
+    if let Some(block) = &report.optimize {
+        let text = "Nothing of the optimized part is undercut";
+        let undercut = block.undercut_volume;
+        checks.push(check(
+            "optimize.undercut_volume",
+            text,
+            undercut,
+            0.0,
+            "mm3",
+        ));
+        let text = "The optimized part is symmetric";
+        checks.push(check(
+            "optimize.symmetry_error",
+            text,
+            block.symmetry_error,
+            0.0,
+            "",
+        ));
+        let text = "The optimized part is one piece";
+        let extra = block.components.saturating_sub(1) as f64;
+        checks.push(check("optimize.components", text, extra, 0.0, DEFECTS));
+    }
     if !report.refused.is_empty() {
         let text = "Every file asked for is written";
         let missing = report.refused.len() as f64;

@@ -6,8 +6,8 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::format::{bytes, count, number, with_unit};
 use super::{
-    BodyBlock, Check, DistanceBlock, InputBlock, NonDesignBlock, Picture, RemeshBlock, Report,
-    SkeletonBlock, SolidBlock, TopologyBlock, TopologyChangeEntry, papers,
+    BodyBlock, Check, DistanceBlock, InputBlock, NonDesignBlock, OptimizeBlock, Picture,
+    RemeshBlock, Report, SkeletonBlock, SolidBlock, TopologyBlock, TopologyChangeEntry, papers,
 };
 use crate::remesh::ChangeKind;
 use crate::topology::Betti;
@@ -32,6 +32,7 @@ pub fn to_html(report: &Report, pictures: &[Picture]) -> String {
                 (checks(&report.checks))
                 (warnings(report))
                 (gallery(pictures))
+                @if let Some(block) = &report.optimize { (optimize(block)) }
                 @if let Some(block) = &report.input { (input(report, block)) }
                 @if let Some(block) = &report.remesh { (remesh(block)) }
                 @if let Some(block) = &report.topology { (topology(block)) }
@@ -181,6 +182,29 @@ fn input(report: &Report, block: &InputBlock) -> Markup {
                 } }
             } }
         }
+    }
+}
+
+fn optimize(block: &OptimizeBlock) -> Markup {
+    let [nx, ny, nz] = block.grid;
+    html! {
+        h2 { "Topology optimization" }
+        (pairs(&[
+            ("Voxel", with_unit(block.voxel, 4, "mm")),
+            ("Grid", format!("{nx} × {ny} × {nz}")),
+            ("Voxels of the space", count(block.elements)),
+            ("Iterations", count(block.iterations)),
+            ("Ended by itself", if block.converged { "yes" } else { "no" }.to_owned()),
+            ("Volume fraction", with_unit(block.volume_fraction, 4, "")),
+            ("Compliance, first iteration", with_unit(block.first_compliance, 6, "N mm")),
+            ("Compliance, last iteration", with_unit(block.compliance, 6, "N mm")),
+            ("Grayness", with_unit(block.grayness, 3, "")),
+            ("Pieces", count(block.components)),
+            ("Volume of full voxels", with_unit(block.volume, 5, "mm³")),
+            ("Undercut volume", with_unit(block.undercut_volume, 3, "mm³")),
+            ("Time of an iteration", with_unit(block.seconds_per_iteration, 3, "s")),
+            ("Iterations of the solver", with_unit(block.solver_iterations, 3, "")),
+        ]))
     }
 }
 

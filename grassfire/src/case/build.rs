@@ -1,0 +1,419 @@
+//! From a project file to voxels.
+
+use std::path::Path;
+
+use nalgebra::Matrix3;
+
+use super::select::Nodes;
+use super::shape::{Solid, any};
+use super::{Case, CaseError, Load, Shape, grid};
+use crate::Vec3;
+use crate::fe::{components, free_modes};
+use crate::monitor::Monitor;
+use crate::topopt::{CORE, DESIGN, FROZEN, LoadCase, OUTSIDE, Problem};
+
+const STAGE: &str = "case";
+
+/// What a selection came to.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SelectionInfo {
+    /// Name.
+    pub name: String,
+    /// Nodes that touch material.
+    pub nodes: usize,
+    /// Their mean, mm.
+    pub centre: [f64; 3],
+    /// Lower corner of the box around them, mm.
+    pub low: [f64; 3],
+    /// Upper corner, mm.
+    pub high: [f64; 3],
+    /// They were taken from non-design bodies only.
+    pub on_frozen: bool,
+}
+
+/// A voxel problem and what was found on the way.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Built {
+    /// The problem.
+    pub problem: Problem,
+    /// All selections that a support or load asks for, by name.
+    pub selections: Vec<SelectionInfo>,
+    /// Non-design bodies: name and voxels.
+    pub bodies: Vec<(String, usize)>,
+}
+
+/// Turns a project file into voxels; `folder` is where its paths begin.
+///
+/// 1. The grid is laid around the design space and the non-design bodies; its memory is estimated first.
+/// 2. A voxel belongs to a shape when its centre does. Bodies win over keep-outs, these over the space.
+/// 3. Selections become nodes. Where a selection meets non-design bodies, only their nodes are taken.
+/// 4. Loads are spread evenly over the nodes; moments by the least forces that give them.
+/// 5. Pieces that no support holds are taken out with a warning; the others must not be able to move.
+///
+/// # Errors
+/// [`CaseError`] names the key, the place and the value.
+pub fn build(case: &Case, folder: &Path, monitor: &Monitor) -> Result<Built, CaseError> {
+    case.check()?;
+    let load = |key: &str, shapes: &[Shape]| -> Result<Vec<Solid>, CaseError> {
+        let each = shapes.iter().enumerate();
+        each.map(|(i, shape)| Solid::load(shape, &format!("{key}[{i}]"), folder, monitor))
+            .collect()
+    };
+    let space = load("design.space", &case.design.space)?;
+    let mut bodies = Vec::new();
+    for (i, body) in case.non_design.iter().enumerate() {
+        let shapes = load(&format!("non_design[{i}].shapes"), &body.shapes)?;
+        bodies.push((shapes, load(&format!("non_design[{i}].cut"), &body.cut)?));
+    }
+    let solids = space
+        .iter()
+        .chain(bodies.iter().flat_map(|(shapes, _)| shapes));
+    let mut bounds: Option<(Vec3, Vec3)> = None;
+    for (lo, hi) in solids.filter_map(Solid::bounds) {
+        bounds = Some(bounds.map_or((lo, hi), |(a, b)| (a.inf(&lo), b.sup(&hi))));
+    }
+    let Some((low, high)) = bounds else {
+        return Err(super::value(
+            "design.space",
+            "endless",
+            "a shape with an end",
+        ));
+    };
+    let (origin, dims) = grid::place(case, low, high)?;
+    let mut problem = Problem {
+        origin,
+        h: case.grid.h,
+        dims,
+        labels: vec![OUTSIDE; dims.iter().product()],
+        young: case.material.young,
+        nu: case.material.nu,
+        ..Problem::default()
+    };
+    let centres: Vec<Vec3> = (0..problem.labels.len())
+        .map(|v| problem.centre(v))
+        .collect();
+    monitor.step(STAGE, "voxels of the design space", 0.1)?;
+    let cut = load("design.cut", &case.design.cut)?;
+    let within = any(&space, &centres);
+    let without = any(&cut, &centres);
+    for v in 0..centres.len() {
+        problem.labels[v] = if within[v] && !without[v] {
+            DESIGN
+        } else {
+            OUTSIDE
+        };
+    }
+    for (i, keep) in case.keep_out.iter().enumerate() {
+        let shapes = load(&format!("keep_out[{i}].shapes"), &keep.shapes)?;
+        let label = if keep.core { CORE } else { OUTSIDE };
+        for (v, _) in any(&shapes, &centres)
+            .iter()
+            .enumerate()
+            .filter(|(_, f)| **f)
+        {
+            problem.labels[v] = label;
+        }
+    }
+    let mut owned = Vec::new();
+    for (body, (shapes, cut)) in case.non_design.iter().zip(&bodies) {
+        monitor.step(STAGE, &body.name, 0.5)?;
+        let (inside, away) = (any(shapes, &centres), any(cut, &centres));
+        let voxels: Vec<usize> = (0..centres.len())
+            .filter(|&v| inside[v] && !away[v])
+            .collect();
+        if voxels.is_empty() {
+            return Err(CaseError::BodyTooSmall {
+                name: body.name.clone(),
+                h: problem.h,
+            });
+        }
+        if !touches_space(&problem, &within, &voxels) {
+            return Err(CaseError::BodyOutside {
+                name: body.name.clone(),
+                voxels: voxels.len(),
+            });
+        }
+        owned.push(voxels);
+    }
+    for &v in owned.iter().flatten() {
+        problem.labels[v] = FROZEN;
+    }
+    drop(centres);
+    let mut built = Built {
+        bodies: case
+            .non_design
+            .iter()
+            .zip(&owned)
+            .map(|(body, voxels)| (body.name.clone(), voxels.len()))
+            .collect(),
+        ..Built::default()
+    };
+    let nodes = nodes(case, &problem, folder, &owned);
+    let (fixed, cases) = conditions(case, &nodes, &mut built.selections, monitor)?;
+    problem.fixed = fixed;
+    problem.cases = cases;
+    hold(&mut problem, monitor)?;
+    built.problem = problem;
+    Ok(built)
+}
+
+/// Whether voxels lie in the space or share a face with it.
+fn touches_space(problem: &Problem, within: &[bool], voxels: &[usize]) -> bool {
+    let [nx, ny, nz] = problem.dims;
+    voxels.iter().any(|&v| {
+        let at = problem.at(v);
+        let sides = [(1, nx), (nx, ny), (nx * ny, nz)];
+        within[v]
+            || (0..3).any(|d| {
+                let (stride, n) = sides[d];
+                at[d] > 0 && within[v - stride] || at[d] + 1 < n && within[v + stride]
+            })
+    })
+}
+
+/// Places of all nodes, and what they touch.
+fn nodes<'a>(
+    case: &'a Case,
+    problem: &'a Problem,
+    folder: &'a Path,
+    bodies: &[Vec<usize>],
+) -> Nodes<'a> {
+    let counts = problem.dims.map(|n| n + 1);
+    let total = counts.iter().product();
+    let at = |i: usize| {
+        [
+            i % counts[0],
+            i / counts[0] % counts[1],
+            i / (counts[0] * counts[1]),
+        ]
+    };
+    let touch = |voxels: &mut dyn Iterator<Item = usize>| {
+        let mut out = vec![false; total];
+        for v in voxels {
+            let [x, y, z] = problem.at(v);
+            for c in 0..8 {
+                let (x, y, z) = (x + (c & 1), y + (c >> 1 & 1), z + (c >> 2));
+                out[(z * counts[1] + y) * counts[0] + x] = true;
+            }
+        }
+        out
+    };
+    let all = 0..problem.labels.len();
+    Nodes {
+        case,
+        problem,
+        folder,
+        places: (0..total).map(|i| problem.node(at(i))).collect(),
+        slack: problem.h,
+        active: touch(&mut all.clone().filter(|&v| problem.is_active(v))),
+        frozen: touch(&mut all.filter(|&v| problem.labels[v] == FROZEN)),
+        bodies: bodies
+            .iter()
+            .map(|b| touch(&mut b.iter().copied()))
+            .collect(),
+    }
+}
+
+type Fixed = Vec<([usize; 3], usize)>;
+
+/// Supports and load cases on nodes.
+fn conditions(
+    case: &Case,
+    nodes: &Nodes,
+    infos: &mut Vec<SelectionInfo>,
+    monitor: &Monitor,
+) -> Result<(Fixed, Vec<LoadCase>), CaseError> {
+    let counts = nodes.problem.dims.map(|n| n + 1);
+    let at = |i: usize| {
+        [
+            i % counts[0],
+            i / counts[0] % counts[1],
+            i / (counts[0] * counts[1]),
+        ]
+    };
+    let mut fixed = Vec::new();
+    for support in &case.support {
+        let found = resolve(nodes, &support.on, "support", infos, monitor)?;
+        for axis in support.fix.chars().filter_map(|c| "xyz".find(c)) {
+            fixed.extend(found.iter().map(|&i| (at(i), axis)));
+        }
+    }
+    fixed.sort_unstable();
+    fixed.dedup();
+    let mut cases = Vec::new();
+    for table in &case.case {
+        let mut forces = Vec::new();
+        for load in &table.loads {
+            let found = resolve(nodes, &load.on, "load", infos, monitor)?;
+            let spread = spread(nodes, &found, load)?;
+            forces.extend(found.iter().map(|&i| at(i)).zip(spread));
+        }
+        cases.push(LoadCase {
+            name: table.name.clone(),
+            weight: table.weight,
+            forces,
+        });
+    }
+    Ok((fixed, cases))
+}
+
+/// The nodes of a selection that touch material; those of non-design bodies where there are any.
+fn resolve(
+    nodes: &Nodes,
+    name: &str,
+    what: &'static str,
+    infos: &mut Vec<SelectionInfo>,
+    monitor: &Monitor,
+) -> Result<Vec<usize>, CaseError> {
+    let selected = nodes.select(nodes.case.find(name, what)?, monitor)?;
+    let all: Vec<usize> = (0..selected.len()).filter(|&i| selected[i]).collect();
+    if all.is_empty() {
+        return Err(CaseError::EmptySelection {
+            name: name.to_owned(),
+        });
+    }
+    let of = |flags: &[bool]| -> Vec<usize> { all.iter().copied().filter(|&i| flags[i]).collect() };
+    let frozen = of(&nodes.frozen);
+    let on_frozen = !frozen.is_empty();
+    let found = if on_frozen { frozen } else { of(&nodes.active) };
+    if found.is_empty() {
+        return Err(CaseError::OnVoid {
+            what,
+            name: name.to_owned(),
+            nodes: all.len(),
+            place: mean(nodes, &all).into(),
+        });
+    }
+    if !on_frozen && nodes.frozen.iter().any(|&f| f) {
+        let text = format!(
+            "the {what} on {name:?} touches no non-design body: it holds on to voxels that may become empty"
+        );
+        monitor.warn(STAGE, text);
+    }
+    if !infos.iter().any(|info| info.name == name) {
+        let corner = |pick: fn(f64, f64) -> f64| {
+            let first = nodes.places[found[0]];
+            found
+                .iter()
+                .fold(first, |m, &i| m.zip_map(&nodes.places[i], pick))
+                .into()
+        };
+        infos.push(SelectionInfo {
+            name: name.to_owned(),
+            nodes: found.len(),
+            centre: mean(nodes, &found).into(),
+            low: corner(f64::min),
+            high: corner(f64::max),
+            on_frozen,
+        });
+    }
+    Ok(found)
+}
+
+fn mean(nodes: &Nodes, of: &[usize]) -> Vec3 {
+    of.iter().map(|&i| nodes.places[i]).sum::<Vec3>() / of.len() as f64
+}
+
+/// The force on every node of a load.
+fn spread(nodes: &Nodes, found: &[usize], load: &Load) -> Result<Vec<[f64; 3]>, CaseError> {
+    let places: Vec<(Vec3, f64)> = found.iter().map(|&i| (nodes.places[i], 1.0)).collect();
+    let forces = spread_evenly(&places, load)?;
+    Ok(forces.into_iter().map(Into::into).collect())
+}
+
+/// Forces on weighted places: shares of the force by weight, and for a moment the smallest forces that make it.
+fn spread_evenly(places: &[(Vec3, f64)], load: &Load) -> Result<Vec<Vec3>, CaseError> {
+    let total: f64 = places.iter().map(|(_, w)| w).sum();
+    let force = Vec3::from(load.force.unwrap_or_default());
+    let mut out: Vec<Vec3> = places.iter().map(|(_, w)| force * (w / total)).collect();
+    if let Some(moment) = load.moment.filter(|m| *m != [0.0; 3]) {
+        let centre = places.iter().map(|(p, w)| p * *w).sum::<Vec3>() / total;
+        let inertia: Matrix3<f64> = places
+            .iter()
+            .map(|(p, w)| (p - centre, w))
+            .map(|(r, w)| (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * *w)
+            .sum();
+        let size = inertia.trace();
+        let sound = inertia.symmetric_eigenvalues().min() > 1e-9 * size;
+        let Some(inverse) = inertia.try_inverse().filter(|_| sound) else {
+            return Err(CaseError::Moment {
+                name: load.on.clone(),
+                nodes: places.len(),
+            });
+        };
+        let turn = inverse * Vec3::from(moment);
+        let arms = places.iter().map(|(p, w)| turn.cross(&(p - centre)) * *w);
+        out.iter_mut().zip(arms).for_each(|(f, more)| *f += more);
+    }
+    Ok(out)
+}
+
+/// Takes out the pieces that no support holds; refuses those that can move or carry a load.
+fn hold(problem: &mut Problem, monitor: &Monitor) -> Result<(), CaseError> {
+    let active: Vec<bool> = (0..problem.labels.len())
+        .map(|v| problem.is_active(v))
+        .collect();
+    let (labels, pieces) = components(problem.dims, &active);
+    let of_node = |node: &[usize; 3]| -> Vec<u32> {
+        let mut out = Vec::new();
+        for c in 0..8 {
+            let below = |d: usize| {
+                let i = node[d].checked_sub(c >> d & 1)?;
+                (i < problem.dims[d]).then_some(i)
+            };
+            if let (Some(x), Some(y), Some(z)) = (below(0), below(1), below(2)) {
+                let label = labels[problem.index([x, y, z])];
+                if label != u32::MAX && !out.contains(&label) {
+                    out.push(label);
+                }
+            }
+        }
+        out
+    };
+    let mut fixed = vec![Vec::new(); pieces.len()];
+    for dof in &problem.fixed {
+        of_node(&dof.0)
+            .into_iter()
+            .for_each(|p| fixed[p as usize].push(*dof));
+    }
+    for case in &problem.cases {
+        for (node, _) in &case.forces {
+            let held = of_node(node)
+                .into_iter()
+                .any(|p| !fixed[p as usize].is_empty());
+            if held || problem.fixed.is_empty() {
+                continue;
+            }
+            return Err(CaseError::LooseLoad {
+                name: case.name.clone(),
+                voxels: of_node(node)
+                    .first()
+                    .map_or(0, |&p| pieces[p as usize].size),
+                place: problem.node(*node).into(),
+            });
+        }
+    }
+    let mut loose = 0;
+    for (piece, fixed) in pieces.iter().zip(&fixed) {
+        if fixed.is_empty() && pieces.len() > 1 {
+            loose += piece.size;
+            continue;
+        }
+        let modes = free_modes(fixed);
+        if !modes.is_empty() {
+            return Err(CaseError::Mechanism { modes });
+        }
+    }
+    if loose > 0 {
+        for (v, &label) in labels.iter().enumerate() {
+            if label != u32::MAX && fixed[label as usize].is_empty() {
+                problem.labels[v] = OUTSIDE;
+            }
+        }
+        monitor.warn(
+            STAGE,
+            format!("{loose} voxels of the space hang together with no support and are left out"),
+        );
+    }
+    Ok(())
+}

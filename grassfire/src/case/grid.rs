@@ -1,0 +1,66 @@
+//! Where the voxels lie.
+
+use super::{Case, CaseError, value};
+use crate::Vec3;
+use crate::fe::{FeError, memory_estimate};
+use crate::topopt::{Parting, TopoptError};
+
+/// A grid around `low` to `high` with a corner at the anchor: lower corner and voxels along x, y, z.
+///
+/// Planes of symmetry and of parting that the anchor is not given for become faces of voxels, and the grid reaches equally
+/// far on both sides of a plane of symmetry.
+pub(super) fn place(case: &Case, low: Vec3, high: Vec3) -> Result<(Vec3, [usize; 3]), CaseError> {
+    let h = case.grid.h;
+    let mut anchor = case.grid.origin.map_or(low, Vec3::from);
+    if let (None, Some(draw)) = (case.grid.origin, &case.optimize.draw)
+        && let (Parting::Plane, Some(axis)) =
+            (draw.parting, draw.dir.iter().position(|&d| d != 0.0))
+    {
+        anchor[axis] = draw.at;
+    }
+    let mut mirrored = [false; 3];
+    for plane in &case.optimize.symmetry {
+        let axis = plane.axis();
+        mirrored[axis] = true;
+        if case.grid.origin.is_none() {
+            anchor[axis] = plane.at;
+        }
+    }
+    let mut origin = Vec3::zeros();
+    let mut counts = [0.0; 3];
+    for d in 0..3 {
+        let up = |length: f64| (length / h - 1e-9).ceil();
+        let (mut below, mut above) = (up(anchor[d] - low[d]), up(high[d] - anchor[d]));
+        if mirrored[d] {
+            below = below.max(above);
+            above = below;
+        }
+        origin[d] = anchor[d] - below * h;
+        counts[d] = below + above;
+    }
+    if counts.iter().any(|&n| n < 1.0) {
+        return Err(value("grid.h", h, "a voxel smaller than the design space"));
+    }
+    let limit = memory_limit(case.solver.max_memory);
+    let dims = counts.map(|n| n.min(1e9) as usize);
+    let needed = memory_estimate(dims, case.case.len()) / 1e6;
+    if needed > limit || counts.iter().any(|&n| n >= 1e9) {
+        return Err(CaseError::Problem(TopoptError::Fe(FeError::Memory {
+            dims,
+            needed,
+            limit,
+        })));
+    }
+    Ok((origin, dims))
+}
+
+/// The memory that there is, MB, at most `wanted`.
+fn memory_limit(wanted: f64) -> f64 {
+    let info = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    let available = info
+        .lines()
+        .find_map(|line| line.strip_prefix("MemAvailable:"))
+        .and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok())
+        .map_or(f64::INFINITY, |kb| 0.9 * kb / 1e3);
+    wanted.min(available)
+}

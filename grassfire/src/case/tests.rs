@@ -1,0 +1,200 @@
+//! Every way in which a project file can be wrong, and the examples.
+
+use std::path::Path;
+
+use super::*;
+use crate::fe::FeError;
+use crate::monitor::Monitor;
+use crate::topopt::{CORE, DESIGN, FROZEN, OUTSIDE, TopoptError, validate};
+
+const GOOD: &str = r#"
+units = "mm-N-MPa"
+[grid]
+h = 2.0
+[material]
+young = 1000.0
+nu = 0.3
+[design]
+space = [{ box = { min = [0, 0, 0], max = [20, 10, 10] } }]
+[[non_design]]
+name = "ring"
+shapes = [{ cylinder = { point = [16, 5, 0], axis = [0, 0, 1], radius = 4, from = 0, to = 10 } }]
+[select]
+left = { plane = { point = [0, 0, 0], normal = [1, 0, 0] } }
+ring = { body = { name = "ring" } }
+corner = { nearest = { point = [20, 10, 10] } }
+[[support]]
+on = "left"
+fix = "xyz"
+[[case]]
+name = "pull"
+loads = [{ on = "ring", force = [100, 0, 0] }]
+[optimize]
+volume_fraction = 0.5
+"#;
+
+fn try_build(text: &str) -> Result<Built, CaseError> {
+    let case = Case::parse("case.toml", text)?;
+    let built = build(&case, Path::new("."), &Monitor::default())?;
+    validate(&built.problem, &case.optimize, &case.solver)?;
+    Ok(built)
+}
+
+/// The error of the good case with one part replaced.
+fn broken(from: &str, to: &str) -> CaseError {
+    assert!(GOOD.contains(from), "{from}");
+    try_build(&GOOD.replace(from, to)).expect_err(to)
+}
+
+#[test]
+fn a_good_case_becomes_voxels() {
+    let built = try_build(GOOD).unwrap();
+    let p = &built.problem;
+    assert_eq!(p.dims, [10, 5, 5]);
+    assert_eq!(p.count(DESIGN) + p.count(FROZEN), 250);
+    assert_eq!(built.bodies, [("ring".to_owned(), p.count(FROZEN))]);
+    assert_eq!(p.fixed.len(), 3 * 36);
+    let sum: f64 = p.cases[0].forces.iter().map(|(_, f)| f[0]).sum();
+    assert!((sum - 100.0).abs() < 1e-9);
+    assert!(
+        built
+            .selections
+            .iter()
+            .any(|s| s.name == "ring" && s.on_frozen)
+    );
+}
+
+#[test]
+fn bad_cases_are_refused_by_name() {
+    let is = |error: CaseError, good: bool| assert!(good, "{error}");
+    let e = broken("volume_fraction", "volum_fraction");
+    assert!(
+        e.hint().is_some_and(|h| h.contains("volume_fraction")),
+        "{e}"
+    );
+    is(broken("mm-N-MPa", "m-N-Pa"), true);
+    let e = broken("young = 1000.0", "young = 2.1e11");
+    assert!(e.to_string().contains("Pa"), "{e}");
+    let e = broken("[[support]]\non = \"left\"\nfix = \"xyz\"\n", "");
+    assert!(matches!(e, CaseError::NoSupport), "{e}");
+    let e = broken("on = \"ring\"", "on = \"rng\"");
+    assert!(e.hint().is_some_and(|h| h.contains("ring")), "{e}");
+    let e = broken("point = [0, 0, 0], normal", "point = [-9, 0, 0], normal");
+    assert!(matches!(e, CaseError::EmptySelection { .. }), "{e}");
+    let e = broken("[100, 0, 0]", "[nan, 0, 0]");
+    assert!(matches!(e, CaseError::Value { .. }), "{e}");
+    for fraction in ["0", "1.5", "0.01"] {
+        let e = broken(
+            "volume_fraction = 0.5",
+            &format!("volume_fraction = {fraction}"),
+        );
+        assert!(matches!(e, CaseError::Problem(_)), "{e}");
+    }
+    let e = broken("point = [16, 5, 0]", "point = [60, 5, 0]");
+    assert!(matches!(e, CaseError::BodyOutside { .. }), "{e}");
+    let e = broken("h = 2.0", "h = 0.0001");
+    let memory = matches!(
+        &e,
+        CaseError::Problem(TopoptError::Fe(FeError::Memory { .. }))
+    );
+    assert!(memory && e.to_string().contains("MB"), "{e}");
+    let e = broken("fix = \"xyz\"", "fix = \"x\"");
+    assert!(
+        matches!(&e, CaseError::Mechanism { modes } if modes.len() >= 3),
+        "{e}"
+    );
+    let e = broken(
+        "{ box = ",
+        "{ file = { path = \"nothing.stl\" } }, { box = ",
+    );
+    assert!(matches!(e, CaseError::MissingFile { .. }), "{e}");
+    let e = broken("{ on = \"ring\", force", "{ on = \"corner\", moment");
+    assert!(matches!(e, CaseError::Moment { .. }), "{e}");
+}
+
+#[test]
+fn loads_on_nothing_are_refused() {
+    let text = GOOD.replace(
+        "max = [20, 10, 10] } }]",
+        "max = [20, 10, 10] } }]\ncut = [{ box = { min = [0, 4, 0], max = [12, 10, 10] } }]",
+    );
+    let text = text.replace(
+        "corner = {",
+        "hole = { box = { min = [2, 8, 2], max = [8, 10, 8] } }\ncorner = {",
+    );
+    let text = text.replace("on = \"ring\"", "on = \"hole\"");
+    let e = try_build(&text).unwrap_err();
+    assert!(matches!(e, CaseError::OnVoid { .. }), "{e}");
+}
+
+#[test]
+fn a_frozen_undercut_is_named_and_a_core_allows_it() {
+    let draw = "volume_fraction = 0.5\ndraw = { dir = [0, 0, 1], parting = \"plane\", at = 0 }";
+    let text = GOOD.replace("volume_fraction = 0.5", draw);
+    assert!(try_build(&text).is_ok());
+    let hole = "[[keep_out]]\nname = \"bore\"\nshapes = [{ box = { min = [6, 4, 2], max = [10, 6, 4] } }]\n[[non_design]]\nname = \"roof\"\nshapes = [{ box = { min = [6, 4, 6], max = [10, 6, 8] } }]\n[select]";
+    let text = text.replace("[select]", hole);
+    let e = try_build(&text).unwrap_err();
+    assert!(
+        matches!(&e, CaseError::Problem(TopoptError::FrozenUndercut { .. })),
+        "{e}"
+    );
+    assert!(try_build(&text.replace("name = \"bore\"", "name = \"bore\"\ncore = true")).is_ok());
+}
+
+#[test]
+fn pieces_without_support_are_left_out() {
+    let text = GOOD.replace(
+        "max = [20, 10, 10] } }]",
+        "max = [20, 10, 10] } }, { box = { min = [30, 0, 0], max = [34, 4, 4] } }]",
+    );
+    let built = try_build(&text).unwrap();
+    assert_eq!(
+        built.problem.count(DESIGN) + built.problem.count(FROZEN),
+        250
+    );
+    let loads = "loads = [{ on = \"far\", force = [1, 0, 0] }]\n[[case]]\nname = \"pull\"\nloads";
+    let text = text.replace(
+        "corner = {",
+        "far = { box = { min = [30, 0, 0], max = [34, 4, 4] } }\ncorner = {",
+    );
+    let e = try_build(&text.replacen("loads", loads, 1)).unwrap_err();
+    assert!(matches!(e, CaseError::LooseLoad { .. }), "{e}");
+}
+
+#[test]
+fn examples_are_sound() {
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
+    for name in [
+        "wishbone",
+        "wishbone-free",
+        "cantilever",
+        "mbb",
+        "l-bracket",
+        "ge-bracket",
+    ] {
+        let path = examples.join(name).join("case.toml");
+        let case = Case::read(&path).unwrap_or_else(|e| panic!("{name}: {e}"));
+        match build(&case, &examples.join(name), &Monitor::default()) {
+            Ok(built) => validate(&built.problem, &case.optimize, &case.solver)
+                .unwrap_or_else(|e| panic!("{name}: {e}")),
+            // Its files are not in the repository.
+            Err(CaseError::MissingFile { .. }) if name == "ge-bracket" => {}
+            Err(e) => panic!("{name}: {e}"),
+        }
+    }
+}
+
+#[test]
+fn the_wishbone_is_as_large_as_it_should_be() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/wishbone/case.toml");
+    let case = Case::read(&path).unwrap();
+    let built = build(&case, Path::new("."), &Monitor::default()).unwrap();
+    let p = &built.problem;
+    let cell = p.h.powi(3);
+    let space = (p.count(DESIGN) + p.count(FROZEN)) as f64 * cell;
+    let frozen = p.count(FROZEN) as f64 * cell;
+    assert!((space / 268_380.0 - 1.0).abs() < 1e-3, "{space}");
+    assert!((frozen / 24_840.0 - 1.0).abs() < 1e-3, "{frozen}");
+    assert!(p.count(CORE) > 0 && p.count(OUTSIDE) > 0);
+}

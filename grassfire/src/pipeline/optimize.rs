@@ -1,0 +1,244 @@
+//! From a project file to densities and a raw proposal.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::deliver::Delivery;
+use super::error::{PipelineError, StageError};
+use super::record::Record;
+use super::{Outcome, inputs};
+use crate::Vec3;
+use crate::case::{self, Built, Case, Shape};
+use crate::fe::components;
+use crate::io;
+use crate::monitor::{Cancelled, Monitor};
+use crate::remesh::{RemeshOptions, iso_surface};
+use crate::report::OptimizeBlock;
+use crate::topopt::{self, Optimized, Problem, State, TopoptError};
+use crate::voxel::VoxelGrid;
+
+/// Density of the surface in `proposal_raw.stl`.
+const ISO: f64 = 0.5;
+/// Saved states.
+const STATE: &str = "optimize.state";
+/// Files that `optimize` writes.
+const FILES: &[(&str, &str)] = &[
+    ("density.vti", "densities of the optimization"),
+    (
+        "proposal_raw.stl",
+        "optimized part: the surface of density 0.5, with the non-design bodies",
+    ),
+    ("history.json", "all iterations of the optimization"),
+    ("report.html", "report to read"),
+    ("report.json", "report for programs"),
+    ("manifest.json", "inputs, versions, times"),
+];
+
+/// One optimization: what to read, where to write, and how.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OptimizeJob {
+    /// The project file as read, with its settings changed.
+    pub case: Case,
+    /// Where it lies: its paths begin there, and its hash goes into the report.
+    pub path: PathBuf,
+    /// Folder for all results.
+    pub output: PathBuf,
+    /// What stands for the run in the report.
+    pub command: String,
+    /// Go on from the state saved in `output`, if there is one.
+    pub resume: bool,
+}
+
+impl OptimizeJob {
+    fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// Files that the case names.
+    fn files(&self) -> Vec<PathBuf> {
+        let case = &self.case;
+        let bodies = case
+            .non_design
+            .iter()
+            .flat_map(|b| b.shapes.iter().chain(&b.cut));
+        let keep = case.keep_out.iter().flat_map(|k| &k.shapes);
+        let shapes = case
+            .design
+            .space
+            .iter()
+            .chain(&case.design.cut)
+            .chain(bodies)
+            .chain(keep);
+        let path = |shape: &Shape| match shape {
+            Shape::File { path, .. } => Some(self.folder().join(path)),
+            _ => None,
+        };
+        std::iter::once(self.path.clone())
+            .chain(shapes.filter_map(path))
+            .collect()
+    }
+}
+
+/// Builds the voxels of a case and checks everything that can be checked without solving.
+///
+/// # Errors
+/// [`PipelineError`] with the stage `case`.
+pub fn check_case(case: &Case, path: &Path, monitor: &Monitor) -> Result<Built, PipelineError> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let fail = |source: StageError| PipelineError {
+        stage: "case",
+        source,
+    };
+    let built = case::build(case, folder, monitor).map_err(|e| fail(e.into()))?;
+    topopt::validate(&built.problem, &case.optimize, &case.solver).map_err(|e| fail(e.into()))?;
+    Ok(built)
+}
+
+/// Optimizes a case.
+///
+/// 1. Voxels, supports and loads are made and checked; nothing is written when that is refused.
+/// 2. The optimization runs; its state is saved now and then if `optimize.save_every` says so.
+/// 3. `density.vti`, `history.json`, `proposal_raw.stl` and the report are written; also when the user stopped the run.
+///
+/// # Errors
+/// [`PipelineError`] names the stage and its cause.
+pub fn optimize(job: &OptimizeJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
+    let case = &job.case;
+    let mut record = Record::start(&job.command);
+    let built = record.stage("case", || -> Result<Built, StageError> {
+        check_case(case, &job.path, monitor).map_err(|e| e.source)
+    })?;
+    let problem = &built.problem;
+    record.report.inputs = record.stage("case", || {
+        let files = job.files();
+        files
+            .iter()
+            .map(|path| inputs::fingerprint(path, monitor))
+            .collect::<Result<_, _>>()
+    })?;
+    let state_path = job.output.join(STATE);
+    let resume = record.stage("case", || -> Result<Option<State>, StageError> {
+        if !(job.resume && state_path.exists()) {
+            return Ok(None);
+        }
+        Ok(Some(State::load(&state_path, problem, &case.optimize)?))
+    })?;
+    let delivery = record.stage("write", || Delivery::open(&job.output, FILES))?;
+    let save = |state: &State| -> Result<(), TopoptError> {
+        Ok(state.save(&state_path, problem, &case.optimize)?)
+    };
+    let result = record.stage("optimize", || {
+        topopt::optimize(
+            problem,
+            &case.optimize,
+            &case.solver,
+            resume,
+            &save,
+            monitor,
+        )
+    })?;
+    record.report.optimize = Some(block(problem, &result));
+    record.stage("write", || write(&delivery, problem, &result, monitor))?;
+    let failed_checks = record.finish(&case.reconstruct.report.limits, monitor);
+    let fail = |source| PipelineError {
+        stage: "report",
+        source,
+    };
+    delivery.report(&mut record.report, &[]).map_err(fail)?;
+    if result.cancelled {
+        return Err(PipelineError {
+            stage: "optimize",
+            source: StageError::Cancelled(Cancelled),
+        });
+    }
+    Ok(Outcome {
+        report: record.report,
+        failed_checks,
+    })
+}
+
+/// The `optimize` block of the report.
+fn block(problem: &Problem, result: &Optimized) -> OptimizeBlock {
+    let history = &result.history;
+    let count = history.len().max(1) as f64;
+    let last = history.last().cloned().unwrap_or_default();
+    let cases = problem.cases.len().max(1) as f64;
+    let active = (0..problem.labels.len())
+        .filter(|&v| problem.is_active(v))
+        .count();
+    let full = result.binary.solid.iter().filter(|&&s| s).count();
+    OptimizeBlock {
+        elements: active,
+        grid: problem.dims,
+        voxel: problem.h,
+        iterations: last.iteration,
+        converged: result.converged,
+        volume_fraction: last.volume_fraction,
+        volume: full as f64 * problem.h.powi(3),
+        first_compliance: result.first_compliance,
+        compliance: last.compliance,
+        case_compliance: result.cases.clone(),
+        grayness: last.grayness,
+        change: last.change,
+        seconds_per_iteration: history.iter().map(|h| h.seconds).sum::<f64>() / count,
+        solver_iterations: history
+            .iter()
+            .map(|h| h.solver_iterations as f64)
+            .sum::<f64>()
+            / (count * cases),
+        fallbacks: result.fallbacks,
+        threshold: result.binary.threshold,
+        components: result.binary.components,
+        undercut_volume: result.binary.undercut_volume,
+        symmetry_error: result.symmetry_error.max(result.binary.symmetry_error),
+    }
+}
+
+/// Densities, history and the raw proposal.
+fn write(
+    delivery: &Delivery,
+    problem: &Problem,
+    result: &Optimized,
+    monitor: &Monitor,
+) -> Result<(), StageError> {
+    let grid = |values| VoxelGrid {
+        origin: problem.origin + Vec3::repeat(problem.h / 2.0),
+        spacing: problem.h,
+        dims: problem.dims,
+        values,
+    };
+    let density = grid(result.rho.iter().map(|&r| r as f32).collect());
+    let solid = result.binary.solid.iter();
+    let full = grid(solid.map(|&s| f32::from(u8::from(s))).collect());
+    let label = grid(problem.labels.iter().map(|&l| f32::from(l)).collect());
+    io::write_vti(
+        &delivery.path("density.vti"),
+        &[("density", &density), ("full", &full), ("label", &label)],
+    )?;
+    let history = format!("{:#}\n", json!(result.history));
+    io::atomic_write(&delivery.path("history.json"), |out| {
+        out.write_all(history.as_bytes())
+    })?;
+    let surface = grid(surface_field(problem.dims, &density.values, result));
+    let mesh = iso_surface(&surface, ISO, &RemeshOptions::default(), monitor)?;
+    delivery.stl("proposal_raw.stl", &mesh)?;
+    Ok(())
+}
+
+/// Densities whose surface is wanted: pieces that were dropped stay empty.
+fn surface_field(dims: [usize; 3], rho: &[f32], result: &Optimized) -> Vec<f32> {
+    let above: Vec<bool> = rho.iter().map(|&r| f64::from(r) > ISO).collect();
+    let (labels, pieces) = components(dims, &above);
+    let mut keep = vec![false; pieces.len()];
+    for (v, _) in result.binary.solid.iter().enumerate().filter(|(_, s)| **s) {
+        if let Some(keep) = keep.get_mut(labels[v] as usize) {
+            *keep = true;
+        }
+    }
+    let part = |(v, &r): (usize, &f32)| match keep.get(labels[v] as usize) {
+        Some(false) => 0.0,
+        _ => r,
+    };
+    rho.iter().enumerate().map(part).collect()
+}

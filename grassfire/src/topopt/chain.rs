@@ -1,0 +1,215 @@
+//! From the variables to the densities, and back for gradients.
+
+use super::options::{OptimizeOptions, Parting};
+use super::problem::{CORE, DESIGN, FROZEN, OUTSIDE};
+use super::projection::Projection;
+use super::symmetry::Symmetry;
+use super::{Filter, Hull, Problem, TopoptError};
+
+/// Filter, hull, projection.
+#[derive(Debug, Clone)]
+pub struct Chain<'a> {
+    problem: &'a Problem,
+    filter: Filter,
+    /// Demoulding.
+    pub hull: Option<Hull>,
+    pub(super) symmetry: Symmetry,
+}
+
+/// The fields of one evaluation.
+#[derive(Debug, Clone, Default)]
+pub struct Fields {
+    /// Filtered, frozen voxels full.
+    filtered: Vec<f64>,
+    /// After the hull.
+    hulled: Vec<f64>,
+    /// Densities: 0 outside, 1 where frozen.
+    pub rho: Vec<f64>,
+    projection: Option<Projection>,
+}
+
+impl<'a> Chain<'a> {
+    /// Checks the planes and prepares the filter.
+    ///
+    /// # Errors
+    /// [`TopoptError::Plane`], [`TopoptError::DrawDirection`], [`TopoptError::FrozenUndercut`].
+    pub fn new(problem: &'a Problem, options: &OptimizeOptions) -> Result<Self, TopoptError> {
+        let inside: Vec<bool> = (0..problem.labels.len())
+            .map(|v| problem.is_active(v))
+            .collect();
+        let filter = Filter::new(
+            options.filter,
+            problem.dims,
+            options.radius(problem.h),
+            &inside,
+            options.boundary,
+        );
+        let symmetry = Symmetry::new(problem, &options.symmetry)?;
+        let chain = Self {
+            problem,
+            filter,
+            hull: hull(problem, options)?,
+            symmetry,
+        };
+        chain.check_frozen()?;
+        Ok(chain)
+    }
+
+    /// Refuses frozen voxels whose shadow holds empty ones that no core makes.
+    fn check_frozen(&self) -> Result<(), TopoptError> {
+        let Some(hull) = &self.hull else {
+            return Ok(());
+        };
+        let labels = &self.problem.labels;
+        let frozen: Vec<f64> = labels
+            .iter()
+            .map(|&l| f64::from(u8::from(l == FROZEN)))
+            .collect();
+        let shadow = hull.hard(&frozen);
+        let bad: Vec<usize> = (0..labels.len())
+            .filter(|&v| labels[v] == OUTSIDE && shadow[v] > 0.5)
+            .collect();
+        if bad.is_empty() {
+            return Ok(());
+        }
+        let name = |&v: &usize| {
+            let (at, c) = (self.problem.at(v), self.problem.centre(v));
+            format!("{at:?} at ({:.2}, {:.2}, {:.2})", c.x, c.y, c.z)
+        };
+        let places: Vec<String> = bad.iter().take(3).map(name).collect();
+        Err(TopoptError::FrozenUndercut {
+            count: bad.len(),
+            places: places.join(", "),
+        })
+    }
+
+    /// Densities for the variables `x`; without `beta` nothing is projected.
+    pub fn forward(&self, x: &[f64], beta: Option<f64>) -> Fields {
+        let labels = &self.problem.labels;
+        let mut filtered = self.filter.forward(x);
+        for (v, &label) in filtered.iter_mut().zip(labels) {
+            match label {
+                OUTSIDE | CORE => *v = 0.0,
+                FROZEN => *v = 1.0,
+                _ => {}
+            }
+        }
+        let hulled = match &self.hull {
+            Some(hull) => hull.smooth(&filtered),
+            None => filtered.clone(),
+        };
+        let design = |m: &[f64]| -> Vec<f64> {
+            let pairs = m.iter().zip(labels);
+            pairs
+                .filter(|(_, l)| **l == DESIGN)
+                .map(|(&v, _)| v)
+                .collect()
+        };
+        let projection = beta.map(|beta| Projection::keeping_volume(beta, &design(&hulled)));
+        let mut rho: Vec<f64> = hulled
+            .iter()
+            .zip(labels)
+            .map(|(&v, &label)| match label {
+                OUTSIDE | CORE => 0.0,
+                FROZEN => 1.0,
+                _ => projection.map_or(v, |p| p.value(v)).clamp(0.0, 1.0),
+            })
+            .collect();
+        self.symmetry.copy(self.problem, &mut rho);
+        Fields {
+            filtered,
+            hulled,
+            rho,
+            projection,
+        }
+    }
+
+    /// Gradient by the variables of a function with gradient `g` by the densities. The threshold of the projection
+    /// follows the variables, which is part of the derivative.
+    pub fn gradient(&self, fields: &Fields, g: &[f64]) -> Vec<f64> {
+        let design = |v: usize| self.problem.labels[v] == DESIGN;
+        let mut of_hulled = vec![0.0; g.len()];
+        match fields.projection {
+            None => (0..g.len())
+                .filter(|&v| design(v))
+                .for_each(|v| of_hulled[v] = g[v]),
+            Some(p) => {
+                let (mut top, mut bottom) = (0.0, 0.0);
+                for v in (0..g.len()).filter(|&v| design(v)) {
+                    let by_eta = p.by_eta(fields.hulled[v]);
+                    top += g[v] * by_eta;
+                    bottom += by_eta;
+                }
+                let factor = if bottom == 0.0 { 0.0 } else { top / bottom };
+                for v in (0..g.len()).filter(|&v| design(v)) {
+                    let slope = p.slope(fields.hulled[v]);
+                    of_hulled[v] = g[v] * slope + factor * (1.0 - slope);
+                }
+            }
+        }
+        self.to_variables(fields, of_hulled)
+    }
+
+    /// Gradient of the volume (in voxels) by the variables; the projection does not change it.
+    pub fn volume_gradient(&self, fields: &Fields) -> Vec<f64> {
+        let labels = &self.problem.labels;
+        let ones = labels
+            .iter()
+            .map(|&l| f64::from(u8::from(l == DESIGN)))
+            .collect();
+        self.to_variables(fields, ones)
+    }
+
+    fn to_variables(&self, fields: &Fields, of_hulled: Vec<f64>) -> Vec<f64> {
+        let mut g = match &self.hull {
+            Some(hull) => hull.transpose(&fields.filtered, &of_hulled),
+            None => of_hulled,
+        };
+        self.mask(&mut g);
+        let mut g = self.filter.transpose(&g);
+        self.mask(&mut g);
+        self.symmetry.average(self.problem, &mut g);
+        g
+    }
+
+    /// Zero but on design voxels.
+    fn mask(&self, g: &mut [f64]) {
+        let pairs = g.iter_mut().zip(&self.problem.labels);
+        pairs
+            .filter(|(_, l)| **l != DESIGN)
+            .for_each(|(g, _)| *g = 0.0);
+    }
+}
+
+/// The hull that the options ask for.
+fn hull(problem: &Problem, options: &OptimizeOptions) -> Result<Option<Hull>, TopoptError> {
+    let Some(draw) = &options.draw else {
+        return Ok(None);
+    };
+    let dir = draw.dir;
+    let size = dir.iter().map(|d| d * d).sum::<f64>().sqrt();
+    let axis = (0..3).find(|&a| size > 0.0 && dir[a].abs() >= (1.0 - 1e-9) * size);
+    let Some(axis) = axis else {
+        return Err(TopoptError::DrawDirection { dir });
+    };
+    let layers = (draw.at - problem.origin[axis]) / problem.h;
+    let layer = layers.round();
+    if draw.parting == Parting::Plane
+        && ((layers - layer).abs() > 1e-6 || layer < 0.0 || layer > problem.dims[axis] as f64)
+    {
+        return Err(TopoptError::Plane {
+            what: "the parting plane",
+            at: draw.at,
+            h: problem.h,
+            nearest: problem.origin[axis] + problem.h * layer.clamp(0.0, problem.dims[axis] as f64),
+        });
+    }
+    let layer = layer.max(0.0) as usize;
+    Ok(Some(Hull::new(
+        problem.dims,
+        axis,
+        dir[axis] > 0.0,
+        draw.parting,
+        layer,
+    )))
+}

@@ -1,0 +1,171 @@
+//! The method of moving asymptotes for one constraint.
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Constants of the asymptotes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct MmaOptions {
+    /// Distance of the first asymptotes.
+    pub initial: f64,
+    /// Factor after an oscillation.
+    pub narrower: f64,
+    /// Factor after two steps the same way.
+    pub wider: f64,
+    /// Nearest and farthest asymptote.
+    pub nearest: f64,
+    /// See `nearest`.
+    pub farthest: f64,
+}
+
+impl Default for MmaOptions {
+    fn default() -> Self {
+        Self {
+            initial: 0.5,
+            narrower: 0.7,
+            wider: 1.2,
+            nearest: 0.01,
+            farthest: 10.0,
+        }
+    }
+}
+
+/// Variables of the last two iterations and their asymptotes.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mma {
+    /// Constants.
+    pub options: MmaOptions,
+    /// Variables one and two iterations ago; empty before.
+    pub last: Vec<f64>,
+    /// See `last`.
+    pub before: Vec<f64>,
+    /// Lower asymptotes.
+    pub low: Vec<f64>,
+    /// Upper asymptotes.
+    pub high: Vec<f64>,
+}
+
+/// The separable approximation at one variable: `p / (high - x) + q / (x - low)` of objective and constraint.
+#[derive(Debug, Clone, Copy, Default)]
+struct Term {
+    p: [f64; 2],
+    q: [f64; 2],
+    low: f64,
+    high: f64,
+    range: [f64; 2],
+}
+
+impl Mma {
+    /// New variables for `min f` under `g <= 0`, all in 0..=1, within `step` of `x`.
+    ///
+    /// 1. The asymptotes move: together after an oscillation, apart after two steps the same way.
+    /// 2. Objective and constraint become separable convex functions with the given gradients at x.
+    /// 3. The multiplier of the constraint is found by bisection; each variable is then a formula.
+    ///
+    /// Variables whose gradients `df` and `dg` are both 0 stay. K. Svanberg: The method of moving asymptotes, 1987,
+    /// doi:10.1002/nme.1620240207.
+    pub fn update(&mut self, x: &[f64], df: &[f64], g: f64, dg: &[f64], step: f64) -> Vec<f64> {
+        self.move_asymptotes(x);
+        let terms: Vec<Term> = (0..x.len())
+            .into_par_iter()
+            .map(|i| self.term(i, x[i], [df[i], dg[i]], step))
+            .collect();
+        let at_x: Vec<f64> = terms
+            .par_chunks(1 << 14)
+            .zip(x.par_chunks(1 << 14))
+            .map(|(terms, x)| terms.iter().zip(x).map(|(t, &x)| t.constraint(x)).sum())
+            .collect();
+        let rest = g - at_x.iter().sum::<f64>();
+        let violation = |multiplier: f64| -> f64 {
+            let parts: Vec<f64> = terms
+                .par_chunks(1 << 14)
+                .map(|terms| terms.iter().map(|t| t.constraint(t.best(multiplier))).sum())
+                .collect();
+            rest + parts.iter().sum::<f64>()
+        };
+        let (mut a, mut b) = (1e-12f64, 1e12f64);
+        while b / a > 1.0 + 1e-7 {
+            let middle = (a * b).sqrt();
+            if violation(middle) > 0.0 {
+                a = middle;
+            } else {
+                b = middle;
+            }
+        }
+        let new: Vec<f64> = terms
+            .par_iter()
+            .zip(x)
+            .map(|(t, &x)| if t.high > t.low { t.best(b) } else { x })
+            .collect();
+        self.before = std::mem::replace(&mut self.last, x.to_vec());
+        new
+    }
+
+    fn move_asymptotes(&mut self, x: &[f64]) {
+        let o = &self.options;
+        if self.before.len() != x.len() {
+            self.low = x.iter().map(|x| x - o.initial).collect();
+            self.high = x.iter().map(|x| x + o.initial).collect();
+            return;
+        }
+        let history = self.last.par_iter().zip(&self.before);
+        let asymptotes = self.low.par_iter_mut().zip(&mut self.high);
+        x.par_iter().zip(history).zip(asymptotes).for_each(
+            |((&x, (&last, &before)), (low, high))| {
+                let turn = (x - last) * (last - before);
+                let factor = if turn < 0.0 {
+                    o.narrower
+                } else if turn > 0.0 {
+                    o.wider
+                } else {
+                    1.0
+                };
+                *low = (x - factor * (last - *low)).clamp(x - o.farthest, x - o.nearest);
+                *high = (x + factor * (*high - last)).clamp(x + o.nearest, x + o.farthest);
+            },
+        );
+    }
+
+    fn term(&self, i: usize, x: f64, gradients: [f64; 2], step: f64) -> Term {
+        if gradients == [0.0; 2] {
+            return Term::default();
+        }
+        let (low, high) = (self.low[i], self.high[i]);
+        let (above, below) = ((high - x).powi(2), (x - low).powi(2));
+        let p = |d: f64| above * (1.001 * d.max(0.0) + 0.001 * (-d).max(0.0) + 1e-5);
+        let q = |d: f64| below * (0.001 * d.max(0.0) + 1.001 * (-d).max(0.0) + 1e-5);
+        Term {
+            p: gradients.map(p),
+            q: gradients.map(q),
+            low,
+            high,
+            range: [
+                (low + 0.1 * (x - low)).max(x - step).max(0.0),
+                (high - 0.1 * (high - x)).min(x + step).min(1.0),
+            ],
+        }
+    }
+}
+
+impl Term {
+    fn constraint(&self, x: f64) -> f64 {
+        if self.high > self.low {
+            self.p[1] / (self.high - x) + self.q[1] / (x - self.low)
+        } else {
+            0.0
+        }
+    }
+
+    /// The minimizer of objective plus multiplier times constraint.
+    fn best(&self, multiplier: f64) -> f64 {
+        let p = (self.p[0] + multiplier * self.p[1]).sqrt();
+        let q = (self.q[0] + multiplier * self.q[1]).sqrt();
+        if p + q <= 0.0 {
+            return 0.5 * (self.range[0] + self.range[1]);
+        }
+        let x = (p * self.low + q * self.high) / (p + q);
+        x.max(self.range[0]).min(self.range[1])
+    }
+}

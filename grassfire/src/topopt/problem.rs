@@ -1,0 +1,90 @@
+//! What is optimized: voxels with labels, supports and load cases.
+
+use crate::Vec3;
+use crate::fe::VoxelModel;
+
+/// Not part of the space.
+pub const OUTSIDE: u8 = 0;
+/// May be full or empty.
+pub const DESIGN: u8 = 1;
+/// Stays full.
+pub const FROZEN: u8 = 2;
+/// Not part of the space, and made by a core: it may lie in the shadow of material.
+pub const CORE: u8 = 3;
+
+/// One load case.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LoadCase {
+    /// Name.
+    pub name: String,
+    /// Weight in the objective.
+    pub weight: f64,
+    /// Forces on nodes, N.
+    pub forces: Vec<([usize; 3], [f64; 3])>,
+}
+
+/// A voxel problem.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Problem {
+    /// Lower corner of voxel (0, 0, 0), mm.
+    pub origin: Vec3,
+    /// Edge of a voxel, mm.
+    pub h: f64,
+    /// Voxels along x, y, z.
+    pub dims: [usize; 3],
+    /// One label a voxel, `[z][y][x]`.
+    pub labels: Vec<u8>,
+    /// Young's modulus, MPa.
+    pub young: f64,
+    /// Poisson's ratio.
+    pub nu: f64,
+    /// Fixed degrees of freedom: node and component.
+    pub fixed: Vec<([usize; 3], usize)>,
+    /// Load cases.
+    pub cases: Vec<LoadCase>,
+}
+
+impl Problem {
+    /// Voxels that are design or frozen.
+    pub fn is_active(&self, voxel: usize) -> bool {
+        matches!(self.labels[voxel], DESIGN | FROZEN)
+    }
+
+    /// Number of voxels with a label.
+    pub fn count(&self, label: u8) -> usize {
+        self.labels.iter().filter(|&&l| l == label).count()
+    }
+
+    /// (x, y, z) of a voxel.
+    pub fn at(&self, voxel: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.dims;
+        [voxel % nx, voxel / nx % ny, voxel / (nx * ny)]
+    }
+
+    /// Index of a voxel.
+    pub fn index(&self, [x, y, z]: [usize; 3]) -> usize {
+        (z * self.dims[1] + y) * self.dims[0] + x
+    }
+
+    /// Centre of a voxel, mm.
+    pub fn centre(&self, voxel: usize) -> Vec3 {
+        let [x, y, z] = self.at(voxel);
+        self.origin + self.h * Vec3::new(x as f64 + 0.5, y as f64 + 0.5, z as f64 + 0.5)
+    }
+
+    /// Position of a node, mm.
+    pub fn node(&self, [x, y, z]: [usize; 3]) -> Vec3 {
+        self.origin + self.h * Vec3::new(x as f64, y as f64, z as f64)
+    }
+
+    /// The model of the solver.
+    pub fn model(&self) -> VoxelModel {
+        VoxelModel {
+            dims: self.dims,
+            h: self.h,
+            nu: self.nu,
+            fixed: self.fixed.clone(),
+            loads: self.cases.iter().map(|case| case.forces.clone()).collect(),
+        }
+    }
+}

@@ -1,0 +1,434 @@
+//! The optimization loop.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::finish::{Binary, binary};
+use super::options::{Objective, OptimizeOptions, UpdateKind};
+use super::problem::{DESIGN, FROZEN};
+use super::state::State;
+use super::{Chain, Fields, Problem, TopoptError, oc};
+use crate::fe::{FeError, Solver, SolverOptions};
+use crate::monitor::Monitor;
+
+const STAGE: &str = "optimize";
+/// Floor of the moduli when the solver does not converge otherwise.
+const RAISED_MIN: f64 = 1e-3;
+/// Exponent of the norm that stands for the worst load case.
+const NORM: f64 = 8.0;
+/// Quiet iterations in a row that end the run.
+const QUIET: usize = 5;
+
+/// What happened in one iteration.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct HistoryEntry {
+    /// From 1.
+    pub iteration: usize,
+    /// f'u over the weighted cases, N mm.
+    pub compliance: f64,
+    /// Volume over that of the space.
+    pub volume_fraction: f64,
+    /// `4 mean(rho (1 - rho))`: 0 when all voxels are full or empty.
+    pub grayness: f64,
+    /// Mean change of density.
+    pub change: f64,
+    /// Penalty exponent.
+    pub penalty: f64,
+    /// Sharpness of the projection; 0 without.
+    pub beta: f64,
+    /// Iterations of conjugate gradients, all cases together.
+    pub solver_iterations: usize,
+    /// Wall time, s.
+    pub seconds: f64,
+}
+
+/// The result of an optimization.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Optimized {
+    /// Densities, `[z][y][x]`.
+    pub rho: Vec<f64>,
+    /// Full and empty voxels.
+    pub binary: Binary,
+    /// All iterations.
+    pub history: Vec<HistoryEntry>,
+    /// f'u over the weighted cases of the first iteration, N mm.
+    pub first_compliance: f64,
+    /// f'u of the last iteration's cases, N mm.
+    pub cases: Vec<f64>,
+    /// Largest difference of densities across the planes of symmetry.
+    pub symmetry_error: f64,
+    /// The stopping limits were met.
+    pub converged: bool,
+    /// The user asked to stop; the densities are the last ones.
+    pub cancelled: bool,
+    /// Solutions for which the smallest modulus had to be raised.
+    pub fallbacks: usize,
+}
+
+/// Makes the structure as stiff as a given volume allows.
+///
+/// 1. Variables start equal, so that the volume is the bound. A saved state goes on instead.
+/// 2. Each iteration: densities (filter, draw hull, projection), moduli `e_min + rho^p (1 - e_min)`, one solution a load
+///    case, compliance and its gradient, volume and its gradient, new variables by MMA or optimality criteria.
+/// 3. The penalty grows first, then the sharpness of the projection; after that the run ends when densities and compliance
+///    are quiet five times in a row, at `max_iterations`, or when the user stops it.
+/// 4. The densities are made full or empty with the same volume ([`binary`]).
+///
+/// `save` is called every `options.save_every` iterations. M. P. Bendsoe, O. Sigmund: Material interpolation schemes in
+/// topology optimization, 1999, doi:10.1007/s004190050248.
+///
+/// # Errors
+/// [`TopoptError`]; when the user stops after the first iteration the last densities are the result instead.
+pub fn optimize(
+    problem: &Problem,
+    options: &OptimizeOptions,
+    solver_options: &SolverOptions,
+    resume: Option<State>,
+    save: &dyn Fn(&State) -> Result<(), TopoptError>,
+    monitor: &Monitor,
+) -> Result<Optimized, TopoptError> {
+    options.check(problem.h)?;
+    let mut run = Run::new(problem, options, solver_options, resume, monitor)?;
+    run.warn_asymmetry(monitor);
+    let mut out = Optimized::default();
+    let mut fields = Fields::default();
+    while run.state.iteration < options.max_iterations {
+        let i = run.state.iteration;
+        let done = i as f64 / options.max_iterations as f64;
+        let asked = monitor.step(STAGE, &format!("iteration {}", i + 1), done);
+        let stopped = match asked.map_err(TopoptError::from) {
+            Err(e) => Err(e),
+            Ok(()) => run.iterate(monitor, &mut fields, &mut out),
+        };
+        match stopped {
+            Ok(ended) => {
+                if options.save_every > 0 && run.state.iteration.is_multiple_of(options.save_every)
+                {
+                    save(&run.state)?;
+                }
+                if ended {
+                    out.converged = true;
+                    break;
+                }
+            }
+            Err(TopoptError::Cancelled(_) | TopoptError::Fe(FeError::Cancelled(_)))
+                if !out.history.is_empty() =>
+            {
+                out.cancelled = true;
+                break;
+            }
+            Err(e) => return Err(e),
+        }
+    }
+    out.rho = std::mem::take(&mut run.state.rho);
+    out.binary = binary(problem, &run.chain, &out.rho, run.target);
+    out.symmetry_error = run.chain.symmetry.error(problem, &out.rho).0;
+    out.fallbacks = run.fallbacks;
+    out.first_compliance = run.state.compliance[0];
+    Ok(out)
+}
+
+/// Refuses what [`optimize`] would refuse, without solving anything.
+///
+/// # Errors
+/// [`TopoptError`].
+pub fn validate(
+    problem: &Problem,
+    options: &OptimizeOptions,
+    solver: &SolverOptions,
+) -> Result<(), TopoptError> {
+    options.check(problem.h)?;
+    target(problem, options)?;
+    let needed = crate::fe::memory_estimate(problem.dims, problem.cases.len()) / 1e6;
+    if needed > solver.max_memory {
+        return Err(TopoptError::Fe(FeError::Memory {
+            dims: problem.dims,
+            needed,
+            limit: solver.max_memory,
+        }));
+    }
+    Chain::new(problem, options).map(drop)
+}
+
+/// Full voxels allowed.
+fn target(problem: &Problem, options: &OptimizeOptions) -> Result<f64, TopoptError> {
+    let (design, frozen) = (problem.count(DESIGN), problem.count(FROZEN));
+    if design == 0 {
+        return Err(TopoptError::NoDesign {
+            frozen,
+            outside: problem.labels.len() - frozen,
+        });
+    }
+    let active = (design + frozen) as f64;
+    let target = options.volume_fraction * active;
+    if target <= frozen as f64 {
+        return Err(TopoptError::VolumeFraction {
+            value: options.volume_fraction,
+            frozen: frozen as f64 / active,
+        });
+    }
+    Ok(target)
+}
+
+/// The parts of a run.
+struct Run<'a> {
+    problem: &'a Problem,
+    options: &'a OptimizeOptions,
+    chain: Chain<'a>,
+    solver: Solver,
+    state: State,
+    free: Vec<bool>,
+    /// Full voxels allowed.
+    target: f64,
+    /// Design and frozen voxels.
+    active: f64,
+    fallbacks: usize,
+}
+
+/// Compliances, and the strain energy of every voxel for modulus 1, weighted with the derivative of the objective.
+struct Response {
+    cases: Vec<f64>,
+    compliance: f64,
+    energy: Vec<f64>,
+    iterations: usize,
+}
+
+impl<'a> Run<'a> {
+    fn new(
+        problem: &'a Problem,
+        options: &'a OptimizeOptions,
+        solver_options: &SolverOptions,
+        resume: Option<State>,
+        monitor: &Monitor,
+    ) -> Result<Self, TopoptError> {
+        let target = target(problem, options)?;
+        let (design, frozen) = (problem.count(DESIGN) as f64, problem.count(FROZEN) as f64);
+        let active = design + frozen;
+        let chain = Chain::new(problem, options)?;
+        let free: Vec<bool> = problem.labels.iter().map(|&l| l == DESIGN).collect();
+        let state = resume.unwrap_or_else(|| {
+            let start = ((target - frozen) / design).min(1.0);
+            let value = |&l: &u8| match l {
+                DESIGN => start,
+                FROZEN => 1.0,
+                _ => 0.0,
+            };
+            State {
+                x: problem.labels.iter().map(value).collect(),
+                rho: vec![0.0; problem.labels.len()],
+                ..State::default()
+            }
+        });
+        monitor.step(STAGE, "setting up the solver", 0.0)?;
+        let present: Vec<f64> = (0..problem.labels.len())
+            .map(|v| {
+                if problem.is_active(v) {
+                    problem.young
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        let solver = Solver::new(problem.model(), &present, solver_options)?;
+        Ok(Self {
+            problem,
+            options,
+            chain,
+            solver,
+            state,
+            free,
+            target,
+            active,
+            fallbacks: 0,
+        })
+    }
+
+    fn warn_asymmetry(&self, monitor: &Monitor) {
+        let labels: Vec<f64> = self.problem.labels.iter().map(|&l| f64::from(l)).collect();
+        let (_, alone) = self.chain.symmetry.error(self.problem, &labels);
+        if alone > 0 {
+            let text = format!(
+                "{alone} voxels of the space have no mirror image across the planes of symmetry: they are designed alone"
+            );
+            monitor.warn(STAGE, text);
+        }
+    }
+
+    /// One iteration; true when the run has converged.
+    fn iterate(
+        &mut self,
+        monitor: &Monitor,
+        fields: &mut Fields,
+        out: &mut Optimized,
+    ) -> Result<bool, TopoptError> {
+        let start = Instant::now();
+        let i = self.state.iteration;
+        let penalty = self.options.penalty_at(i);
+        let beta = (self.options.beta > 0.0).then(|| self.options.beta_at(i));
+        *fields = self.chain.forward(&self.state.x, beta);
+        let response = self.respond(&fields.rho, penalty, monitor)?;
+        let e_min = self.options.e_min;
+        let slope = |rho: f64| -penalty * rho.powf(penalty - 1.0) * (1.0 - e_min);
+        let young = self.problem.young;
+        let g: Vec<f64> = fields
+            .rho
+            .par_iter()
+            .zip(&response.energy)
+            .map(|(&rho, &energy)| young * slope(rho) * energy)
+            .collect();
+        let df = self.chain.gradient(fields, &g);
+        let dv = self.chain.volume_gradient(fields);
+        let volume: f64 = fields.rho.iter().sum();
+        let previous = std::mem::replace(&mut self.state.rho, fields.rho.clone());
+        let change = previous
+            .iter()
+            .zip(&fields.rho)
+            .map(|(a, b)| (a - b).abs())
+            .sum::<f64>()
+            / self.active;
+        let last = std::mem::replace(&mut self.state.compliance[1], response.compliance);
+        if i == 0 {
+            self.state.compliance[0] = response.compliance;
+        }
+        let quiet = self.options.is_final(i)
+            && change < self.options.stop_change
+            && ((response.compliance - last) / response.compliance).abs()
+                < self.options.stop_compliance;
+        self.state.quiet = if quiet { self.state.quiet + 1 } else { 0 };
+        self.state.iteration = i + 1;
+        let ended = self.state.quiet >= QUIET;
+        if !ended {
+            self.update(&df, &dv, volume);
+        }
+        out.cases = response.cases;
+        out.history.push(HistoryEntry {
+            iteration: i + 1,
+            compliance: response.compliance,
+            volume_fraction: volume / self.active,
+            grayness: 4.0 * fields.rho.iter().map(|r| r * (1.0 - r)).sum::<f64>() / self.active,
+            change,
+            penalty,
+            beta: beta.unwrap_or(0.0),
+            solver_iterations: response.iterations,
+            seconds: start.elapsed().as_secs_f64(),
+        });
+        Ok(ended)
+    }
+
+    /// New variables.
+    fn update(&mut self, df: &[f64], dv: &[f64], volume: f64) {
+        let step = self.options.limit();
+        let mut x = match self.options.update {
+            UpdateKind::Oc => oc::update(
+                &self.state.x,
+                &self.free,
+                df,
+                dv,
+                self.target - volume,
+                step,
+            ),
+            UpdateKind::Mma => {
+                let scale = 100.0 / self.state.compliance[0];
+                let df: Vec<f64> = df.iter().map(|d| d * scale).collect();
+                let dv: Vec<f64> = dv.iter().map(|d| d / self.target).collect();
+                self.state
+                    .mma
+                    .update(&self.state.x, &df, volume / self.target - 1.0, &dv, step)
+            }
+        };
+        self.chain.symmetry.copy(self.problem, &mut x);
+        self.state.x = x;
+    }
+
+    /// Solves all load cases for the densities.
+    fn respond(
+        &mut self,
+        rho: &[f64],
+        penalty: f64,
+        monitor: &Monitor,
+    ) -> Result<Response, TopoptError> {
+        let count = self.problem.cases.len();
+        self.solver
+            .set_moduli(&self.moduli(rho, penalty, self.options.e_min))?;
+        let mut iterations = 0;
+        let mut case = 0;
+        let mut raised = false;
+        while case < count {
+            match self.solver.solve(case, monitor) {
+                Ok(stats) => {
+                    iterations += stats.iterations;
+                    case += 1;
+                }
+                Err(e @ FeError::NotConverged { .. }) if raised => return Err(e.into()),
+                Err(FeError::NotConverged { iterations: n, .. }) => {
+                    // Loose material that floats in almost nothing defeats the multigrid.
+                    raised = true;
+                    iterations += n;
+                    if self.fallbacks == 0 {
+                        monitor.warn(STAGE, format!("iteration {}: the solver did not converge in {n} iterations; solved with empty voxels at {RAISED_MIN} of the modulus", self.state.iteration + 1));
+                    }
+                    self.fallbacks += 1;
+                    self.solver.restart();
+                    self.solver
+                        .set_moduli(&self.moduli(rho, penalty, RAISED_MIN))?;
+                    case = 0;
+                }
+                Err(e) => return Err(e.into()),
+            }
+        }
+        let cases: Vec<f64> = (0..count).map(|k| self.solver.compliance(k)).collect();
+        let weighted: Vec<f64> = cases
+            .iter()
+            .zip(&self.problem.cases)
+            .map(|(c, k)| c * k.weight)
+            .collect();
+        let (compliance, shares) = match self.options.objective {
+            Objective::Weighted => (weighted.iter().sum(), vec![1.0; count]),
+            Objective::Worst => worst(&weighted),
+        };
+        let mut energy = vec![0.0; rho.len()];
+        for (k, share) in shares.iter().enumerate() {
+            let factor = share * self.problem.cases[k].weight;
+            let of_case = self.solver.energies(k);
+            energy
+                .par_iter_mut()
+                .zip(&of_case)
+                .for_each(|(sum, e)| *sum += factor * e);
+        }
+        Ok(Response {
+            cases,
+            compliance,
+            energy,
+            iterations,
+        })
+    }
+
+    fn moduli(&self, rho: &[f64], penalty: f64, e_min: f64) -> Vec<f64> {
+        rho.par_iter()
+            .enumerate()
+            .map(|(v, &rho)| {
+                if self.problem.is_active(v) {
+                    self.problem.young * (e_min + rho.powf(penalty) * (1.0 - e_min))
+                } else {
+                    0.0
+                }
+            })
+            .collect()
+    }
+}
+
+/// The p-norm of the compliances and its derivatives.
+fn worst(c: &[f64]) -> (f64, Vec<f64>) {
+    let top = c
+        .iter()
+        .fold(0.0f64, |m, &v| m.max(v))
+        .max(f64::MIN_POSITIVE);
+    let sum: f64 = c.iter().map(|v| (v / top).powf(NORM)).sum();
+    let norm = top * sum.powf(1.0 / NORM);
+    (
+        norm,
+        c.iter().map(|v| (v / norm).powf(NORM - 1.0)).collect(),
+    )
+}

@@ -1,0 +1,154 @@
+//! Saved states: an interrupted run goes on where it was.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::{Mma, OptimizeOptions, Problem, TopoptError};
+use crate::io::{IoError, atomic_write};
+
+/// Everything that the next iteration needs.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct State {
+    /// Iterations done.
+    pub iteration: usize,
+    /// Variables.
+    pub x: Vec<f64>,
+    /// Densities of the last iteration.
+    pub rho: Vec<f64>,
+    /// Compliance of the first and of the last iteration.
+    pub compliance: [f64; 2],
+    /// Iterations in a row below the stopping limits.
+    pub quiet: usize,
+    /// Asymptotes.
+    pub mma: Mma,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    problem: String,
+    iteration: usize,
+    compliance: [f64; 2],
+    quiet: usize,
+    lengths: Vec<usize>,
+}
+
+impl State {
+    /// Writes the state; `problem` and `options` are kept as a hash.
+    ///
+    /// # Errors
+    /// [`IoError::Write`].
+    pub fn save(
+        &self,
+        path: &Path,
+        problem: &Problem,
+        options: &OptimizeOptions,
+    ) -> Result<(), IoError> {
+        let fields = [
+            &self.x,
+            &self.rho,
+            &self.mma.last,
+            &self.mma.before,
+            &self.mma.low,
+            &self.mma.high,
+        ];
+        let header = Header {
+            problem: fingerprint(problem, options),
+            iteration: self.iteration,
+            compliance: self.compliance,
+            quiet: self.quiet,
+            lengths: fields.iter().map(|f| f.len()).collect(),
+        };
+        atomic_write(path, |out| {
+            serde_json::to_writer(&mut *out, &header)?;
+            out.write_all(b"\n")?;
+            for value in fields.into_iter().flatten() {
+                out.write_all(&value.to_le_bytes())?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Reads a state of the same problem.
+    ///
+    /// # Errors
+    /// [`TopoptError::State`] when it is damaged or of another problem; [`TopoptError::Io`].
+    pub fn load(
+        path: &Path,
+        problem: &Problem,
+        options: &OptimizeOptions,
+    ) -> Result<Self, TopoptError> {
+        let bytes = crate::io::read_file(path, u64::MAX / 2)?;
+        let bad = |what: &str| TopoptError::State {
+            file: path.display().to_string(),
+            what: what.to_owned(),
+        };
+        let end = bytes
+            .iter()
+            .position(|&b| b == b'\n')
+            .ok_or_else(|| bad("it has no header"))?;
+        let header: Header =
+            serde_json::from_slice(&bytes[..end]).map_err(|e| bad(&e.to_string()))?;
+        if header.problem != fingerprint(problem, options) {
+            return Err(bad("its voxels, loads or options differ"));
+        }
+        let n = problem.labels.len();
+        let data = &bytes[end + 1..];
+        let fits = header.lengths.len() == 6
+            && header.lengths.iter().all(|&l| l == 0 || l == n)
+            && data.len() == 8 * header.lengths.iter().sum::<usize>();
+        if !fits || header.lengths[0] != n {
+            return Err(bad("it is damaged"));
+        }
+        let mut numbers = data.chunks_exact(8).map(|c| {
+            let mut b = [0; 8];
+            b.copy_from_slice(c);
+            f64::from_le_bytes(b)
+        });
+        let mut field = |i: usize| {
+            numbers
+                .by_ref()
+                .take(header.lengths[i])
+                .collect::<Vec<f64>>()
+        };
+        let state = Self {
+            iteration: header.iteration,
+            compliance: header.compliance,
+            quiet: header.quiet,
+            x: field(0),
+            rho: field(1),
+            mma: Mma {
+                last: field(2),
+                before: field(3),
+                low: field(4),
+                high: field(5),
+                ..Mma::default()
+            },
+        };
+        Ok(state)
+    }
+}
+
+/// SHA-256 of what the variables mean; the number of iterations may change.
+fn fingerprint(problem: &Problem, options: &OptimizeOptions) -> String {
+    let mut hash = Sha256::new();
+    hash.update(&problem.labels);
+    let options = OptimizeOptions {
+        max_iterations: 0,
+        save_every: 0,
+        ..options.clone()
+    };
+    let rest = format!(
+        "{:?} {:?} {} {} {} {:?} {:?} {options:?}",
+        problem.dims,
+        problem.origin,
+        problem.h,
+        problem.young,
+        problem.nu,
+        problem.fixed,
+        problem.cases
+    );
+    hash.update(rest.as_bytes());
+    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
