@@ -32,6 +32,11 @@ pub enum Command {
     Reconstruct(Box<ReconstructArgs>),
     /// Optimizes the topology of a project file
     Optimize(Box<CaseArgs>),
+    /// Optimizes a project file, reconstructs the result and verifies it
+    Run(Box<ChainArgs>),
+    /// Computes the stiffness of a finished solid under the loads of a project file
+    #[command(after_help = VERIFY_EXAMPLES)]
+    Verify(Box<VerifyArgs>),
     /// Checks a project file and lists what its selections hold
     Check(Box<CheckArgs>),
     /// Computes how a solid freezes in sand: hot spots, feeding, Niyama's criterion
@@ -184,6 +189,60 @@ pub struct CaseArgs {
     /// Go on from the state that an earlier run saved there (optimize.save_every)
     #[arg(long)]
     pub resume: bool,
+    /// What all runs share.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// Arguments of `run`.
+#[derive(Debug, Args)]
+pub struct ChainArgs {
+    /// Project file (TOML)
+    #[arg(value_name = "CASE")]
+    pub case: PathBuf,
+    /// The last stage
+    #[arg(long, value_enum, value_name = "STAGE", default_value = "verify")]
+    pub to: ChainEnd,
+    /// Folder for the results; made when missing [default: out/ and the name of the project file or of its folder]
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// What all runs share.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// Where `run` ends.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum ChainEnd {
+    /// After the optimization
+    Optimize,
+    /// After the reconstruction
+    Reconstruct,
+    /// After the proof of stiffness
+    Verify,
+}
+
+const VERIFY_EXAMPLES: &str = "\
+Examples:
+  grassfire verify part.step --case case.toml -o out
+  grassfire verify part.step --case case.toml --proposal opt/density.vti -o out
+  grassfire verify case.toml -o out                   the part.step and density.vti in out";
+
+/// Arguments of `verify`.
+#[derive(Debug, Args)]
+pub struct VerifyArgs {
+    /// The solid (a closed mesh or STEP); or the project file, whose part.step (else part.stl) lies in DIR
+    #[arg(value_name = "SOLID|CASE")]
+    pub input: PathBuf,
+    /// Project file (TOML) with material, supports and loads
+    #[arg(long, value_name = "CASE")]
+    pub case: Option<PathBuf>,
+    /// The density.vti of `optimize` on the same project file: its full voxels are loaded too
+    #[arg(long, value_name = "FILE")]
+    pub proposal: Option<PathBuf>,
+    /// Folder for the results; made when missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
     /// What all runs share.
     #[command(flatten)]
     pub run: RunArgs,

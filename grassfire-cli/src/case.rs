@@ -1,13 +1,13 @@
 //! `grassfire optimize` and `grassfire check`: work on a project file.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use grassfire::case::{Built, Case, CaseError};
 use grassfire::monitor::Monitor;
-use grassfire::pipeline::{self, OptimizeJob};
+use grassfire::pipeline::{self, OptimizeJob, RunJob, Stage, VerifyJob};
 
-use crate::args::{CaseArgs, CheckArgs, RunArgs};
+use crate::args::{CaseArgs, ChainArgs, ChainEnd, CheckArgs, RunArgs, VerifyArgs};
 use crate::failure::{Failure, chain};
 use crate::{run, settings};
 
@@ -53,6 +53,86 @@ pub fn optimize_command(args: &CaseArgs) -> Result<u8, Failure> {
     run::run(job.case.threads, &job.output, &args.run, |monitor| {
         pipeline::optimize(&job, monitor)
     })
+}
+
+/// `grassfire run`.
+pub fn run_command(args: &ChainArgs) -> Result<u8, Failure> {
+    let case = load(&args.case, &args.run)?;
+    let job = RunJob {
+        path: args.case.clone(),
+        output: args.output.clone().unwrap_or_else(|| results(&args.case)),
+        command: run::command_line(),
+        to: match args.to {
+            ChainEnd::Optimize => Stage::Optimize,
+            ChainEnd::Reconstruct => Stage::Reconstruct,
+            ChainEnd::Verify => Stage::Verify,
+        },
+        case,
+    };
+    run::run(job.case.threads, &job.output, &args.run, |monitor| {
+        pipeline::run(&job, monitor)
+    })
+}
+
+/// Where the results of a project file go: a file `case.toml` is named after its folder.
+fn results(case: &Path) -> PathBuf {
+    let whole = std::path::absolute(case).unwrap_or_else(|_| case.to_owned());
+    let stem = whole.file_stem().filter(|stem| *stem != "case");
+    let folder = whole.parent().and_then(Path::file_name);
+    Path::new("out").join(stem.or(folder).unwrap_or("case".as_ref()))
+}
+
+/// `grassfire verify`.
+pub fn verify_command(args: &VerifyArgs) -> Result<u8, Failure> {
+    let is_case = args
+        .input
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    let (path, part, proposal) = match (is_case, &args.case) {
+        (false, Some(path)) => (path.clone(), args.input.clone(), args.proposal.clone()),
+        (false, None) => {
+            return Err(Failure::usage(
+                "verify needs a project file with the loads",
+                Some("give it with --case case.toml".to_owned()),
+            ));
+        }
+        (true, Some(_)) => {
+            return Err(Failure::usage(
+                format!("{} is a project file, not a solid", args.input.display()),
+                Some("grassfire verify part.step --case case.toml -o out".to_owned()),
+            ));
+        }
+        (true, None) => {
+            let part = left(&args.output, &["part.step", "part.stl"]).ok_or_else(|| {
+                Failure::usage(
+                    format!("there is no part.step in {}", args.output.display()),
+                    Some("grassfire verify part.step --case case.toml -o out".to_owned()),
+                )
+            })?;
+            let proposal = args.proposal.clone();
+            let proposal = proposal.or_else(|| left(&args.output, &["density.vti"]));
+            (args.input.clone(), part, proposal)
+        }
+    };
+    let case = load(&path, &args.run)?;
+    let job = VerifyJob {
+        case,
+        path,
+        part,
+        proposal,
+        output: args.output.clone(),
+        command: run::command_line(),
+    };
+    run::run(job.case.threads, &job.output, &args.run, |monitor| {
+        pipeline::verify_solid(&job, monitor)
+    })
+}
+
+/// The first of some files that an earlier run left in a folder. STEP needs the CAD kernel.
+fn left(folder: &Path, names: &[&str]) -> Option<PathBuf> {
+    let usable = |name: &&&str| cfg!(feature = "occt") || !name.ends_with(".step");
+    let paths = names.iter().filter(usable).map(|name| folder.join(name));
+    paths.into_iter().find(|path| path.is_file())
 }
 
 /// `grassfire check`.

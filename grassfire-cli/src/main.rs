@@ -40,6 +40,8 @@ fn dispatch(command: &Command) -> Result<u8, Failure> {
         Command::Mould(args) => return run::mould_command(args),
         Command::Demo(args) => return run::demo_command(args),
         Command::Optimize(args) => return case::optimize_command(args),
+        Command::Run(args) => return case::run_command(args),
+        Command::Verify(args) => return case::verify_command(args),
         Command::Check(args) => return case::check_command(args),
         Command::Schema { of } => run::print(&schema(*of)?),
         Command::About(args) => run::print(&about::text(args.cite)),

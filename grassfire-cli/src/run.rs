@@ -65,6 +65,7 @@ pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
         output: args.output.clone(),
         command: command_line(),
         options: options(&short, &args.run)?,
+        ..ReconstructJob::default()
     };
     let work = |monitor: &Monitor| reconstruct(&job, monitor);
     run(job.options.threads, &job.output, &args.run, work)
@@ -145,11 +146,10 @@ pub fn demo_command(args: &DemoArgs) -> Result<u8, Failure> {
     let job = ReconstructJob {
         part,
         non_design,
-        design_space: None,
-        skeleton: None,
         output,
         command,
         options,
+        ..ReconstructJob::default()
     };
     let work = |monitor: &Monitor| reconstruct(&job, monitor);
     run(job.options.threads, &job.output, &args.run, work)

@@ -79,6 +79,7 @@ pub fn text(report: &Report, output: &Path) -> String {
             ),
         ));
     }
+    lines.extend(stiffness(report));
     lines.extend(casting(report));
     if !report.checks.is_empty() {
         let met = report.checks.iter().filter(|check| check.met).count();
@@ -112,6 +113,7 @@ pub fn text(report: &Report, output: &Path) -> String {
     }
     for name in [
         "density.vti",
+        "result.vtu",
         "part.step",
         "solidification.vti",
         "repaired.stl",
@@ -126,6 +128,51 @@ pub fn text(report: &Report, output: &Path) -> String {
         let _ = writeln!(text, "{name:>9}  {value}");
         text
     })
+}
+
+/// Verification.
+fn stiffness(report: &Report) -> Vec<(&'static str, String)> {
+    let Some(block) = &report.verify else {
+        return Vec::new();
+    };
+    let mut text = format!(
+        "{:.0} mm3, u_max {:.3} mm, U {:.3} J ({:.1} % between grids), c*v {:.1} kJ mm3",
+        block.volume,
+        block.u_max,
+        block.strain_energy / 1e3,
+        100.0 * block.energy_error_estimate,
+        block.cv / 1e6
+    );
+    if let (Some(cv), Some(volume)) = (block.cv_equal_volume, block.equal_volume) {
+        let _ = write!(text, ", {:.1} at {volume:.0} mm3", cv / 1e6);
+    }
+    let mut lines = vec![("stiffness", text)];
+    if let Some(proposal) = &block.proposal {
+        let mut text = format!(
+            "{:.0} mm3, u_max {:.3} mm, U {:.3} J ({:.1} % between grids), c*v {:.1} kJ mm3",
+            proposal.volume,
+            proposal.u_max,
+            proposal.strain_energy / 1e3,
+            100.0 * proposal.energy_error_estimate,
+            proposal.cv / 1e6
+        );
+        if let Some(ratio) = proposal.cv_ratio {
+            let _ = write!(text, "; the solid has {ratio:.3} times that");
+        }
+        lines.push(("its voxels", text));
+    }
+    if let (Some(stress), Some(p)) = (block.stress_max, block.stress_place) {
+        let margin = match block.yield_margin {
+            Some(margin) => format!(", margin to yield {:+.0} %", 100.0 * margin),
+            None => String::new(),
+        };
+        let text = format!(
+            "von Mises up to {stress:.0} MPa at ({:.1}, {:.1}, {:.1}) mm{margin}",
+            p[0], p[1], p[2]
+        );
+        lines.push(("stress", text));
+    }
+    lines
 }
 
 /// Feeding and solidification.

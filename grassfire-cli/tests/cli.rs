@@ -53,6 +53,8 @@ fn help_names_the_commands() {
     Commands:
       reconstruct  Turns a mesh or a density into a STEP solid and a report
       optimize     Optimizes the topology of a project file
+      run          Optimizes a project file, reconstructs the result and verifies it
+      verify       Computes the stiffness of a finished solid under the loads of a project file
       check        Checks a project file and lists what its selections hold
       solidify     Computes how a solid freezes in sand: hot spots, feeding, Niyama's criterion
       mould        Looks at how a solid leaves its mould: undercuts, parting, draft, walls

@@ -29,6 +29,7 @@ pub mod skeleton;
 pub mod spline;
 pub mod thicken;
 pub mod topopt;
+pub mod verify;
 
 /// A point or a vector in millimetres.
 pub type Vec3 = nalgebra::Vector3<f64>;

@@ -3,6 +3,8 @@
 //! A newcomer reads [`reconstruct`]: every stage is one call, its result one value that the next stage takes.
 
 mod bodies;
+#[cfg(feature = "occt")]
+mod case_bodies;
 mod casting;
 mod construct;
 mod deliver;
@@ -16,9 +18,11 @@ mod measure;
 mod optimize;
 mod recognise;
 mod record;
+mod run;
 mod shape;
 mod short_edges;
 mod union;
+mod verify;
 
 use std::path::PathBuf;
 
@@ -29,20 +33,23 @@ pub use casting::{SolidJob, mould_solid, solidify_solid};
 pub use error::{PipelineError, StageError};
 pub use exchange::{FileOptions, Format};
 pub use optimize::{OptimizeJob, check_case, optimize};
+pub use run::{RunJob, Stage, run};
 pub use shape::RetryOptions;
+pub use verify::{VerifyJob, verify_solid};
 
 use crate::cad::{CadOptions, NonDesignOptions, StepOptions};
+use crate::case::Body;
 use crate::casting::feed::FeedOptions;
 use crate::casting::mould::MouldOptions;
 use crate::casting::solidify::SolidifyOptions;
 use crate::fit::FitOptions;
 use crate::io::ReadOptions;
 use crate::medial::{self, MedialOptions, PoleOptions};
-use crate::mesh::RepairOptions;
+use crate::mesh::{RepairOptions, TriMesh};
 use crate::monitor::Monitor;
 use crate::radii::RadiiOptions;
 use crate::remesh::{CutOutOptions, RemeshOptions, WrapOptions};
-use crate::report::{Report, ReportOptions};
+use crate::report::{Picture, Report, ReportOptions};
 use crate::skeleton::SkeletonOptions;
 use crate::spline::{BrepOptions, PatchOptions, TessellateOptions};
 use crate::thicken::ThickenOptions;
@@ -116,6 +123,10 @@ pub struct ReconstructJob {
     pub design_space: Option<PathBuf>,
     /// A quad skeleton drawn elsewhere, in place of ours.
     pub skeleton: Option<PathBuf>,
+    /// Bodies of a project file to unite as well; their paths begin at `folder`.
+    pub bodies: Vec<Body>,
+    /// Folder of the project file.
+    pub folder: PathBuf,
     /// Folder for all results; made when it does not exist.
     pub output: PathBuf,
     /// What stands for the run in the report.
@@ -153,9 +164,53 @@ pub struct Outcome {
 /// [`PipelineError`] names the stage and its cause. A result that was made but fails a check is not an error: see
 /// [`Outcome::failed_checks`].
 pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
-    let options = &job.options;
     let mut record = Record::start(&job.command);
+    let rebuilt = rebuild(&mut record, job, monitor)?;
+    finish(
+        record,
+        &rebuilt.delivery,
+        &rebuilt.pictures,
+        &job.options.report,
+        monitor,
+    )
+}
 
+/// A finished part.
+struct Rebuilt {
+    delivery: Delivery,
+    pictures: Vec<Picture>,
+    /// Its triangles.
+    mesh: TriMesh,
+}
+
+/// Verdicts and the report, the last files of every run.
+fn finish(
+    mut record: Record,
+    delivery: &Delivery,
+    pictures: &[Picture],
+    options: &ReportOptions,
+    monitor: &Monitor,
+) -> Result<Outcome, PipelineError> {
+    let failed_checks = record.finish(&options.limits, monitor);
+    delivery
+        .report(&mut record.report, pictures)
+        .map_err(|source| PipelineError {
+            stage: "report",
+            source,
+        })?;
+    Ok(Outcome {
+        report: record.report,
+        failed_checks,
+    })
+}
+
+/// All stages of [`reconstruct`] but the report.
+fn rebuild(
+    record: &mut Record,
+    job: &ReconstructJob,
+    monitor: &Monitor,
+) -> Result<Rebuilt, PipelineError> {
+    let options = &job.options;
     exchange::check(options).map_err(|source| PipelineError {
         stage: "options",
         source,
@@ -193,7 +248,7 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
     let edited = match drawn {
         // The radii of a drawn skeleton are what its author wants: they are edited, not the proposal.
         Some(_) => None,
-        None => feeding::edit(&mut record, &remeshed, &bodies, options, monitor)?,
+        None => feeding::edit(record, &remeshed, &bodies, options, monitor)?,
     };
     let original = remeshed;
     let remeshed = edited.as_ref().unwrap_or(&original);
@@ -203,7 +258,7 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         })?;
     }
     let mut site = Site {
-        record: &mut record,
+        record,
         remeshed,
         bodies: &mut bodies,
         drawn: drawn.as_ref(),
@@ -242,8 +297,8 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
     record.report.distance = Some(measure::distance_block(&distance, remeshed, &part));
     record.report.volume = Some(measure::volume_block(remeshed, &part));
 
-    feeding::prove(&mut record, &original, &part.mesh, options, monitor)?;
-    casting::mould_of(&mut record, &part.mesh, &options.mould, monitor)?;
+    feeding::prove(record, &original, &part.mesh, options, monitor)?;
+    casting::mould_of(record, &part.mesh, &options.mould, monitor)?;
     let pictures = record.stage("pictures", || {
         let stages = illustrate::Stages {
             remeshed,
@@ -255,15 +310,9 @@ pub fn reconstruct(job: &ReconstructJob, monitor: &Monitor) -> Result<Outcome, P
         };
         illustrate::pictures(&stages, &options.report, monitor)
     })?;
-    let failed_checks = record.finish(&options.report.limits, monitor);
-    delivery
-        .report(&mut record.report, &pictures)
-        .map_err(|source| PipelineError {
-            stage: "report",
-            source,
-        })?;
-    Ok(Outcome {
-        report: record.report,
-        failed_checks,
+    Ok(Rebuilt {
+        delivery,
+        pictures,
+        mesh: part.mesh,
     })
 }

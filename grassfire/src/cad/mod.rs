@@ -47,7 +47,7 @@ pub use {
     build::{CadSolid, FaceSource, Joined, build, finish, join},
     inspect::NonDesignResult,
     non_design::{
-        DesignSpace, NonDesignBody, Rebuilt, SpaceBore, from_boss, from_mesh, read,
+        DesignSpace, NonDesignBody, Rebuilt, SpaceBore, from_boss, from_mesh, from_shape, read,
         read_design_space,
     },
     output::{

@@ -143,6 +143,20 @@ pub fn from_mesh(
     Ok(out)
 }
 
+/// A non-design body from a solid of the kernel.
+///
+/// # Errors
+/// [`CadError::Kernel`], [`CadError::InvalidSolid`].
+pub fn from_shape(
+    name: String,
+    source: &str,
+    solid: Shape,
+    options: &NonDesignOptions,
+    monitor: &Monitor,
+) -> Result<NonDesignBody, CadError> {
+    body(name, source, Rebuilt::Exact, solid, options, monitor)
+}
+
 /// Makes the sleeve of a recognised boss: a hollow cylinder, its bore kept free beyond the ends as far as the proposal is.
 ///
 /// # Errors

@@ -54,11 +54,7 @@ pub struct Built {
 /// [`CaseError`] names the key, the place and the value.
 pub fn build(case: &Case, folder: &Path, monitor: &Monitor) -> Result<Built, CaseError> {
     case.check()?;
-    let load = |key: &str, shapes: &[Shape]| -> Result<Vec<Solid>, CaseError> {
-        let each = shapes.iter().enumerate();
-        each.map(|(i, shape)| Solid::load(shape, &format!("{key}[{i}]"), folder, monitor))
-            .collect()
-    };
+    let load = |key: &str, shapes: &[Shape]| Solid::load_all(shapes, key, folder, monitor);
     let space = load("design.space", &case.design.space)?;
     let mut bodies = Vec::new();
     for (i, body) in case.non_design.iter().enumerate() {
@@ -79,7 +75,7 @@ pub fn build(case: &Case, folder: &Path, monitor: &Monitor) -> Result<Built, Cas
             "a shape with an end",
         ));
     };
-    let (origin, dims) = grid::place(case, low, high)?;
+    let (origin, dims) = grid::place(case, case.grid.h, low, high)?;
     let mut problem = Problem {
         origin,
         h: case.grid.h,
@@ -149,12 +145,56 @@ pub fn build(case: &Case, folder: &Path, monitor: &Monitor) -> Result<Built, Cas
         ..Built::default()
     };
     let nodes = nodes(case, &problem, folder, &owned);
-    let (fixed, cases) = conditions(case, &nodes, &mut built.selections, monitor)?;
+    let (fixed, cases) = conditions(&nodes, problem.dims, &mut built.selections, monitor)?;
     problem.fixed = fixed;
     problem.cases = cases;
     hold(&mut problem, monitor)?;
     built.problem = problem;
     Ok(built)
+}
+
+/// Supports and load cases on the nodes of a problem that is finer than its project file says: its voxels were cut. The
+/// selections reach as far as on the voxels of the project file.
+///
+/// # Errors
+/// As [`build`].
+pub(crate) fn conditions_on(
+    case: &Case,
+    problem: &Problem,
+    folder: &Path,
+    monitor: &Monitor,
+) -> Result<(Fixed, Vec<LoadCase>), CaseError> {
+    let centres: Vec<Vec3> = (0..problem.labels.len())
+        .map(|v| problem.centre(v))
+        .collect();
+    let bodies: Vec<Vec<usize>> = in_bodies(case, folder, &centres, monitor)?
+        .iter()
+        .map(|inside| (0..centres.len()).filter(|&v| inside[v]).collect())
+        .collect();
+    drop(centres);
+    let mut nodes = nodes(case, problem, folder, &bodies);
+    nodes.slack = case.grid.h;
+    conditions(&nodes, problem.dims, &mut Vec::new(), monitor)
+}
+
+/// For every non-design body which points lie in it.
+pub(crate) fn in_bodies(
+    case: &Case,
+    folder: &Path,
+    points: &[Vec3],
+    monitor: &Monitor,
+) -> Result<Vec<Vec<bool>>, CaseError> {
+    let within = |key: &str, shapes: &[Shape]| -> Result<Vec<bool>, CaseError> {
+        Ok(any(&Solid::load_all(shapes, key, folder, monitor)?, points))
+    };
+    let mut out = Vec::new();
+    for (i, body) in case.non_design.iter().enumerate() {
+        let mut inside = within(&format!("non_design[{i}].shapes"), &body.shapes)?;
+        let away = within(&format!("non_design[{i}].cut"), &body.cut)?;
+        inside.iter_mut().zip(away).for_each(|(i, a)| *i &= !a);
+        out.push(inside);
+    }
+    Ok(out)
 }
 
 /// Whether voxels lie in the space or share a face with it.
@@ -201,7 +241,6 @@ fn nodes<'a>(
     let all = 0..problem.labels.len();
     Nodes {
         case,
-        problem,
         folder,
         places: (0..total).map(|i| problem.node(at(i))).collect(),
         slack: problem.h,
@@ -214,16 +253,16 @@ fn nodes<'a>(
     }
 }
 
-type Fixed = Vec<([usize; 3], usize)>;
+pub(crate) type Fixed = Vec<([usize; 3], usize)>;
 
 /// Supports and load cases on nodes.
 fn conditions(
-    case: &Case,
     nodes: &Nodes,
+    dims: [usize; 3],
     infos: &mut Vec<SelectionInfo>,
     monitor: &Monitor,
 ) -> Result<(Fixed, Vec<LoadCase>), CaseError> {
-    let counts = nodes.problem.dims.map(|n| n + 1);
+    let counts = dims.map(|n| n + 1);
     let at = |i: usize| {
         [
             i % counts[0],
@@ -232,7 +271,7 @@ fn conditions(
         ]
     };
     let mut fixed = Vec::new();
-    for support in &case.support {
+    for support in &nodes.case.support {
         let found = resolve(nodes, &support.on, "support", infos, monitor)?;
         for axis in support.fix.chars().filter_map(|c| "xyz".find(c)) {
             fixed.extend(found.iter().map(|&i| (at(i), axis)));
@@ -241,7 +280,7 @@ fn conditions(
     fixed.sort_unstable();
     fixed.dedup();
     let mut cases = Vec::new();
-    for table in &case.case {
+    for table in &nodes.case.case {
         let mut forces = Vec::new();
         for load in &table.loads {
             let found = resolve(nodes, &load.on, "load", infos, monitor)?;
@@ -322,7 +361,7 @@ fn spread(nodes: &Nodes, found: &[usize], load: &Load) -> Result<Vec<[f64; 3]>, 
 }
 
 /// Forces on weighted places: shares of the force by weight, and for a moment the smallest forces that make it.
-fn spread_evenly(places: &[(Vec3, f64)], load: &Load) -> Result<Vec<Vec3>, CaseError> {
+pub(super) fn spread_evenly(places: &[(Vec3, f64)], load: &Load) -> Result<Vec<Vec3>, CaseError> {
     let total: f64 = places.iter().map(|(_, w)| w).sum();
     let force = Vec3::from(load.force.unwrap_or_default());
     let mut out: Vec<Vec3> = places.iter().map(|(_, w)| force * (w / total)).collect();

@@ -5,12 +5,16 @@ use crate::Vec3;
 use crate::fe::{FeError, memory_estimate};
 use crate::topopt::{Parting, TopoptError};
 
-/// A grid around `low` to `high` with a corner at the anchor: lower corner and voxels along x, y, z.
+/// A grid of voxels of edge `h` around `low` to `high` with a corner at the anchor: lower corner and voxels along x, y, z.
 ///
 /// Planes of symmetry and of parting that the anchor is not given for become faces of voxels, and the grid reaches equally
 /// far on both sides of a plane of symmetry.
-pub(super) fn place(case: &Case, low: Vec3, high: Vec3) -> Result<(Vec3, [usize; 3]), CaseError> {
-    let h = case.grid.h;
+pub(crate) fn place(
+    case: &Case,
+    h: f64,
+    low: Vec3,
+    high: Vec3,
+) -> Result<(Vec3, [usize; 3]), CaseError> {
     let mut anchor = case.grid.origin.map_or(low, Vec3::from);
     if let (None, Some(draw)) = (case.grid.origin, &case.optimize.draw)
         && let (Parting::Plane, Some(axis)) =

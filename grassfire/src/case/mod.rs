@@ -5,6 +5,7 @@
 mod build;
 mod error;
 mod grid;
+mod places;
 mod select;
 mod shape;
 
@@ -18,13 +19,17 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use build::{Built, SelectionInfo, build};
+pub(crate) use build::{conditions_on, in_bodies};
 pub use error::CaseError;
+pub(crate) use grid::place as place_grid;
+pub(crate) use places::{Places, forces_on};
 pub use select::Selector;
 pub use shape::Shape;
 
 use crate::fe::SolverOptions;
 use crate::pipeline::ReconstructOptions;
 use crate::topopt::OptimizeOptions;
+use crate::verify::VerifyOptions;
 
 /// The units of every case.
 pub const UNITS: &str = "mm-N-MPa";
@@ -59,6 +64,8 @@ pub struct Case {
     pub optimize: OptimizeOptions,
     /// Finite element solver.
     pub solver: SolverOptions,
+    /// Proof of stiffness of the finished solid.
+    pub verify: VerifyOptions,
     /// Reconstruction; the options of `grassfire reconstruct`.
     pub reconstruct: ReconstructOptions,
 }

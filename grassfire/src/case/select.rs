@@ -10,7 +10,6 @@ use super::{Case, CaseError, finite, value};
 use crate::Vec3;
 use crate::mesh::Bvh;
 use crate::monitor::Monitor;
-use crate::topopt::Problem;
 
 /// Tolerances in voxels: the corners of voxels lie beside the true surface.
 const RADIAL: f64 = 0.8;
@@ -161,9 +160,8 @@ fn refer(from: &str, to: &str, key: &str, case: &Case) -> Result<(), CaseError> 
 /// What selections are made on.
 pub(super) struct Nodes<'a> {
     pub case: &'a Case,
-    pub problem: &'a Problem,
     pub folder: &'a Path,
-    /// Positions of all nodes of the grid, `[z][y][x]`.
+    /// Positions: all nodes of a grid, `[z][y][x]`, or points of a surface.
     pub places: Vec<Vec3>,
     /// Length that tolerances are a share of, mm; the edge of a voxel for nodes of a labelled grid.
     pub slack: f64,

@@ -154,6 +154,18 @@ impl Solid {
         }
     }
 
+    /// [`Solid::load`] for a list of shapes.
+    pub fn load_all(
+        shapes: &[Shape],
+        key: &str,
+        folder: &Path,
+        monitor: &Monitor,
+    ) -> Result<Vec<Self>, CaseError> {
+        let each = shapes.iter().enumerate();
+        each.map(|(i, shape)| Self::load(shape, &format!("{key}[{i}]"), folder, monitor))
+            .collect()
+    }
+
     /// Lower and upper corner; none when it has no end.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         match self {

@@ -17,6 +17,7 @@ mod pcg;
 mod smoother;
 mod solver;
 mod stencil;
+mod stress;
 mod transfer;
 
 #[cfg(test)]
@@ -26,6 +27,7 @@ pub use islands::{Component, components};
 pub use mechanism::{RIGID_MODES, free_modes};
 pub use pcg::SolveStats;
 pub use solver::{Solver, VoxelModel, memory_estimate};
+pub use stress::von_mises;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

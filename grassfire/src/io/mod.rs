@@ -26,6 +26,7 @@ mod vti_write;
 mod vtk;
 mod vtk_array;
 mod vtk_grid;
+mod vtu_write;
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -42,6 +43,7 @@ pub use skeleton::{read_skeleton, read_skeleton_bytes, write_skeleton};
 pub use stl::write_stl;
 pub use threemf_write::{ThreeMfObject, ThreeMfTexts, write_3mf};
 pub use vti_write::write_vti;
+pub use vtu_write::{Hexahedra, write_vtu};
 
 use crate::mesh::{Repair, TriMesh};
 use crate::monitor::Monitor;

@@ -47,16 +47,17 @@ pub fn write_vti(path: &Path, fields: &[(&str, &VoxelGrid<f32>)]) -> Result<(), 
                 out,
                 "<DataArray type=\"Float32\" Name=\"{name}\" format=\"binary\">"
             )?;
-            array(out, &field.values)?;
+            let bytes: Vec<u8> = field.values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            array(out, &bytes)?;
             writeln!(out, "</DataArray>")?;
         }
         writeln!(out, "</CellData></Piece></ImageData></VTKFile>")
     })
 }
 
-/// Header (blocks, their size, size of the last, compressed sizes) and data, each base64 of its own.
-fn array(out: &mut dyn Write, values: &[f32]) -> std::io::Result<()> {
-    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+/// The bytes of an array, compressed: header (blocks, their size, size of the last, compressed sizes) and data, each base64
+/// of its own.
+pub(super) fn array(out: &mut dyn Write, bytes: &[u8]) -> std::io::Result<()> {
     let (mut header, mut data) = (Vec::new(), Vec::new());
     let blocks: Vec<&[u8]> = bytes.chunks(BLOCK).collect();
     let last = blocks.last().map_or(0, |b| b.len() % BLOCK);

@@ -1,6 +1,8 @@
 //! The non-design bodies of a run, as solids for the union and as surfaces for measuring.
 
 use super::ReconstructJob;
+#[cfg(feature = "occt")]
+use super::case_bodies;
 use super::error::StageError;
 use crate::Vec3;
 #[cfg(feature = "occt")]
@@ -151,11 +153,13 @@ pub(super) fn read(job: &ReconstructJob, monitor: &Monitor) -> Result<Bodies, St
         };
         bodies.solids.extend(solids);
     }
+    bodies.solids.extend(case_bodies::make(job, monitor)?);
     bodies.measure(0)?;
     Ok(bodies)
 }
 
-/// Without OpenCASCADE there is no union: a job with non-design bodies is refused.
+/// Without OpenCASCADE there is no union: a job with non-design bodies is refused; those of a project file stay as the
+/// optimization made them.
 #[cfg(not(feature = "occt"))]
 pub(super) fn read(job: &ReconstructJob, _monitor: &Monitor) -> Result<Bodies, StageError> {
     match job.non_design.first() {

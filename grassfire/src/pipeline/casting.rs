@@ -163,7 +163,7 @@ fn mould_block(found: &Mould) -> MouldBlock {
 }
 
 /// Triangles of the solid.
-fn solid(job: &SolidJob, monitor: &Monitor) -> Result<TriMesh, StageError> {
+pub(super) fn solid(job: &SolidJob, monitor: &Monitor) -> Result<TriMesh, StageError> {
     let options = &job.options;
     match io::read_input(&job.part, &options.read, monitor)? {
         Input::Mesh { mesh, .. } => Ok(repair(mesh, &options.repair, monitor)?.mesh),

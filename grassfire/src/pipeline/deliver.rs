@@ -44,28 +44,25 @@ const PIECES: &str = "pieces";
 pub(super) struct Delivery {
     folder: PathBuf,
     /// Names that a run of this kind may write, and what they hold.
-    files: &'static [(&'static str, &'static str)],
+    files: Vec<(&'static str, &'static str)>,
 }
 
 impl Delivery {
     /// Makes the folder and takes away what an earlier run left in it.
     pub(super) fn open(
         folder: &Path,
-        files: &'static [(&'static str, &'static str)],
+        files: &[(&'static str, &'static str)],
     ) -> Result<Self, IoError> {
         let fail = |path: &Path, source| IoError::Write {
             file: path.display().to_string(),
             source,
         };
         std::fs::create_dir_all(folder).map_err(|e| fail(folder, e))?;
-        let delivery = Self {
-            folder: folder.to_owned(),
-            files,
-        };
+        let delivery = Self::over(folder, files);
         for (name, _) in files {
             delivery.remove(name)?;
         }
-        if files == FILES {
+        if delivery.has_pieces() {
             for piece in delivery.pieces() {
                 delivery.remove(&piece)?;
             }
@@ -75,10 +72,22 @@ impl Delivery {
         Ok(delivery)
     }
 
+    /// A folder with what is in it.
+    pub(super) fn over(folder: &Path, files: &[(&'static str, &'static str)]) -> Self {
+        Self {
+            folder: folder.to_owned(),
+            files: files.to_vec(),
+        }
+    }
+
+    fn has_pieces(&self) -> bool {
+        self.files.iter().any(|(name, _)| *name == "part.step")
+    }
+
     /// The files of the pieces that are there: `organic.step` and `body-*.step`.
     fn pieces(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.folder.join(PIECES));
-        let Some(entries) = entries.ok().filter(|_| self.files == FILES) else {
+        let Some(entries) = entries.ok().filter(|_| self.has_pieces()) else {
             return Vec::new();
         };
         let ours = |name: &String| {

@@ -20,6 +20,7 @@ use crate::skeleton::SkeletonError;
 use crate::spline::SplineError;
 use crate::thicken::ThickenError;
 use crate::topopt::TopoptError;
+use crate::verify::VerifyError;
 
 /// A run that could not go on.
 #[derive(Debug, thiserror::Error)]
@@ -72,6 +73,10 @@ pub enum StageError {
     Case(#[from] CaseError),
     #[error(transparent)]
     Topopt(#[from] TopoptError),
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
+    #[error("{} holds no densities; the proposal of a verification is the density.vti of the optimization", path.display())]
+    NoDensity { path: PathBuf },
     #[error("{} is a STEP file; the proposal must be a mesh or a density", path.display())]
     StepProposal { path: PathBuf },
     #[error("{} holds densities; a non-design body must be a STEP solid or a closed mesh", path.display())]
@@ -109,6 +114,10 @@ impl PipelineError {
             StageError::Feed(_) => 2,
             StageError::Solidify(SolidifyError::NotFrozen { .. }) => 3,
             StageError::Solidify(_) | StageError::Mould(_) => 2,
+            StageError::Verify(VerifyError::Fe(
+                FeError::NotConverged { .. } | FeError::Factor { .. },
+            )) => 3,
+            StageError::Verify(_) => 2,
             _ if matches!(
                 self.stage,
                 "options" | "case" | "read" | "non_design" | "recognise"
@@ -140,6 +149,8 @@ impl PipelineError {
             StageError::Report(e) => e.hint(),
             StageError::Case(e) => e.hint(),
             StageError::Topopt(e) => e.hint(),
+            StageError::Verify(e) => e.hint(),
+            StageError::NoDensity { .. } => Some("leave --proposal out to do without".into()),
             StageError::StepProposal { .. } => {
                 Some("give the optimization result, and this file with --non-design".into())
             }
@@ -177,6 +188,12 @@ impl PipelineError {
                 | StageError::Spline(SplineError::Cancelled(_))
                 | StageError::Cad(CadError::Cancelled(_))
                 | StageError::Case(CaseError::Cancelled(_))
+                | StageError::Verify(
+                    VerifyError::Cancelled(_)
+                        | VerifyError::Case(CaseError::Cancelled(_))
+                        | VerifyError::Fe(FeError::Cancelled(_))
+                        | VerifyError::Remesh(RemeshError::Cancelled(_))
+                )
                 | StageError::Topopt(
                     TopoptError::Cancelled(_) | TopoptError::Fe(FeError::Cancelled(_))
                 )

@@ -169,14 +169,16 @@ pub(super) fn fingerprint(path: &Path, monitor: &Monitor) -> Result<InputFile, S
         file: path.display().to_string(),
         source,
     })?;
-    let sha256 = Sha256::digest(&bytes)
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
     Ok(InputFile {
         path: path.display().to_string(),
-        sha256,
+        sha256: hash(&bytes),
     })
+}
+
+/// SHA-256 as hexadecimal digits.
+pub(super) fn hash(bytes: &[u8]) -> String {
+    let digest = Sha256::digest(bytes);
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// The kind as it stands in `report.json`.

@@ -7,14 +7,14 @@ use serde_json::json;
 use super::deliver::Delivery;
 use super::error::{PipelineError, StageError};
 use super::record::Record;
-use super::{Outcome, inputs};
+use super::{Outcome, finish, inputs};
 use crate::Vec3;
 use crate::case::{self, Built, Case, Shape};
 use crate::fe::components;
 use crate::io;
 use crate::monitor::{Cancelled, Monitor};
 use crate::remesh::{RemeshOptions, iso_surface};
-use crate::report::OptimizeBlock;
+use crate::report::{InputFile, OptimizeBlock};
 use crate::topopt::{self, Optimized, Problem, State, TopoptError};
 use crate::voxel::VoxelGrid;
 
@@ -23,7 +23,7 @@ const ISO: f64 = 0.5;
 /// Saved states.
 const STATE: &str = "optimize.state";
 /// Files that `optimize` writes.
-const FILES: &[(&str, &str)] = &[
+pub(super) const FILES: &[(&str, &str)] = &[
     ("density.vti", "densities of the optimization"),
     (
         "proposal_raw.stl",
@@ -104,19 +104,51 @@ pub fn check_case(case: &Case, path: &Path, monitor: &Monitor) -> Result<Built, 
 /// # Errors
 /// [`PipelineError`] names the stage and its cause.
 pub fn optimize(job: &OptimizeJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
-    let case = &job.case;
     let mut record = Record::start(&job.command);
+    let done = optimized(&mut record, job, monitor)?;
+    let options = &job.case.reconstruct.report;
+    let outcome = finish(record, &done.delivery, &[], options, monitor)?;
+    if done.cancelled {
+        return Err(PipelineError {
+            stage: "optimize",
+            source: StageError::Cancelled(Cancelled),
+        });
+    }
+    Ok(outcome)
+}
+
+/// A finished or stopped optimization.
+pub(super) struct Done {
+    pub(super) delivery: Delivery,
+    pub(super) block: OptimizeBlock,
+    /// 1 in full voxels, 0 in others.
+    pub(super) full: VoxelGrid<f32>,
+    /// The user stopped it.
+    pub(super) cancelled: bool,
+}
+
+/// Name and SHA-256 of the project file, which comes first, and of the files that it names.
+pub(super) fn fingerprints(
+    job: &OptimizeJob,
+    monitor: &Monitor,
+) -> Result<Vec<InputFile>, StageError> {
+    let files = job.files();
+    let one = |path: &PathBuf| inputs::fingerprint(path, monitor);
+    files.iter().map(one).collect()
+}
+
+/// All stages of [`optimize`] but the report.
+pub(super) fn optimized(
+    record: &mut Record,
+    job: &OptimizeJob,
+    monitor: &Monitor,
+) -> Result<Done, PipelineError> {
+    let case = &job.case;
     let built = record.stage("case", || -> Result<Built, StageError> {
         check_case(case, &job.path, monitor).map_err(|e| e.source)
     })?;
     let problem = &built.problem;
-    record.report.inputs = record.stage("case", || {
-        let files = job.files();
-        files
-            .iter()
-            .map(|path| inputs::fingerprint(path, monitor))
-            .collect::<Result<_, _>>()
-    })?;
+    record.report.inputs = record.stage("case", || fingerprints(job, monitor))?;
     let state_path = job.output.join(STATE);
     let resume = record.stage("case", || -> Result<Option<State>, StageError> {
         if !(job.resume && state_path.exists()) {
@@ -138,24 +170,31 @@ pub fn optimize(job: &OptimizeJob, monitor: &Monitor) -> Result<Outcome, Pipelin
             monitor,
         )
     })?;
-    record.report.optimize = Some(block(problem, &result));
+    let block = block(problem, &result);
+    record.report.optimize = Some(block.clone());
     record.stage("write", || write(&delivery, problem, &result, monitor))?;
-    let failed_checks = record.finish(&case.reconstruct.report.limits, monitor);
-    let fail = |source| PipelineError {
-        stage: "report",
-        source,
-    };
-    delivery.report(&mut record.report, &[]).map_err(fail)?;
-    if result.cancelled {
-        return Err(PipelineError {
-            stage: "optimize",
-            source: StageError::Cancelled(Cancelled),
-        });
-    }
-    Ok(Outcome {
-        report: record.report,
-        failed_checks,
+    Ok(Done {
+        full: full(problem, &result),
+        delivery,
+        block,
+        cancelled: result.cancelled,
     })
+}
+
+/// Values on the voxels of a problem.
+fn grid(problem: &Problem, values: Vec<f32>) -> VoxelGrid<f32> {
+    VoxelGrid {
+        origin: problem.origin + Vec3::repeat(problem.h / 2.0),
+        spacing: problem.h,
+        dims: problem.dims,
+        values,
+    }
+}
+
+/// The full voxels.
+fn full(problem: &Problem, result: &Optimized) -> VoxelGrid<f32> {
+    let solid = result.binary.solid.iter();
+    grid(problem, solid.map(|&s| f32::from(u8::from(s))).collect())
 }
 
 /// The `optimize` block of the report.
@@ -202,15 +241,9 @@ fn write(
     result: &Optimized,
     monitor: &Monitor,
 ) -> Result<(), StageError> {
-    let grid = |values| VoxelGrid {
-        origin: problem.origin + Vec3::repeat(problem.h / 2.0),
-        spacing: problem.h,
-        dims: problem.dims,
-        values,
-    };
+    let grid = |values| grid(problem, values);
     let density = grid(result.rho.iter().map(|&r| r as f32).collect());
-    let solid = result.binary.solid.iter();
-    let full = grid(solid.map(|&s| f32::from(u8::from(s))).collect());
+    let full = full(problem, result);
     let label = grid(problem.labels.iter().map(|&l| f32::from(l)).collect());
     io::write_vti(
         &delivery.path("density.vti"),

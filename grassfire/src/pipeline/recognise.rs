@@ -52,7 +52,7 @@ pub(super) fn recognise(
         return Ok(Found::default());
     };
     let recognised = non_design::recognise(mesh, &options.non_design.recognition, monitor)?;
-    let unite = mode == RecogniseMode::Auto && job.non_design.is_empty();
+    let unite = mode == RecogniseMode::Auto && job.non_design.is_empty() && job.bodies.is_empty();
     let mut found = Found::default();
     let mut bosses = recognised.bosses.clone();
     if let Some(path) = &job.design_space {

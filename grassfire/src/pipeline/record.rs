@@ -58,6 +58,16 @@ impl Record {
         result
     }
 
+    /// Notes a stage whose result was taken from an earlier run.
+    pub(super) fn cached(&mut self, name: &str) {
+        self.report.stages.push(StageEntry {
+            name: name.to_owned(),
+            seconds: 0.0,
+            peak_memory: peak_memory(),
+            cached: true,
+        });
+    }
+
     /// Adds warnings, papers and verdicts; gives the checks that were not met, one line each.
     pub(super) fn finish(&mut self, limits: &Limits, monitor: &Monitor) -> Vec<String> {
         self.report.warnings = monitor.warnings();

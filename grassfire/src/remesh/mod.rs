@@ -30,6 +30,7 @@ pub use cut_out::{Bosses, CutOutOptions, DesignPart, cut_out};
 pub use error::RemeshError;
 pub use options::{Capsule, RemeshOptions};
 pub use resolution::default_voxel;
+pub(crate) use sample::split_long_edges;
 pub use wrap::{WrapOptions, wrap};
 
 use serde::Serialize;

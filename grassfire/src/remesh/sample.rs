@@ -97,7 +97,7 @@ fn sample(
 
 /// Halves the longest edge of every triangle until it is at most `length`: long triangles make poor boxes, and every
 /// query would visit most of them. Neighbours are split at the same points.
-pub(super) fn split_long_edges(mesh: &TriMesh, length: f64) -> TriMesh {
+pub(crate) fn split_long_edges(mesh: &TriMesh, length: f64) -> TriMesh {
     let mut out = TriMesh {
         points: mesh.points.clone(),
         ..TriMesh::default()

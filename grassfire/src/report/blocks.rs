@@ -1,8 +1,8 @@
 //! The blocks of `report.json`; field names are the JSON keys.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::{Check, FeedBlock, MouldBlock, SolidifyBlock};
+use super::{Check, FeedBlock, MouldBlock, SolidifyBlock, VerifyBlock};
 use crate::monitor::Warning;
 use crate::remesh::{ChangeKind, TopologyChange};
 use crate::spline::CurvatureJump;
@@ -56,6 +56,9 @@ pub struct Report {
     /// The topology optimization.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub optimize: Option<OptimizeBlock>,
+    /// The stiffness of the finished solid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub verify: Option<VerifyBlock>,
     /// Surfaces and bosses that were recognised in the proposal.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub candidates: Vec<CandidateBlock>,
@@ -340,7 +343,7 @@ pub struct VolumeBlock {
 }
 
 /// The topology optimization.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct OptimizeBlock {
     /// Voxels of the design space with its non-design bodies.
     pub elements: usize,

@@ -27,6 +27,10 @@ pub struct Limits {
     pub non_design: f64,
     /// Largest isolated hot spot when feeders are given, mm3.
     pub hot_spot: f64,
+    /// Largest relative difference of the strain energies on the two grids of a verification.
+    pub energy_error: f64,
+    /// Largest sum of reactions and loads over the loads.
+    pub reaction: f64,
 }
 
 impl Default for Limits {
@@ -39,6 +43,8 @@ impl Default for Limits {
             volume_check: 1e-4,
             non_design: 1e-3,
             hot_spot: 1000.0,
+            energy_error: 0.05,
+            reaction: 1e-3,
         }
     }
 }
@@ -83,6 +89,7 @@ pub fn judge(report: &Report, limits: &Limits) -> Vec<Check> {
     solid(report, limits, &mut checks);
     fidelity(report, limits, &mut checks);
     super::casting::judge(report, limits, &mut checks);
+    super::verification::judge(report, limits, &mut checks);
     if let Some(block) = &report.optimize {
         let text = "Nothing of the optimized part is undercut";
         let undercut = block.undercut_volume;

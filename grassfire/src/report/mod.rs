@@ -11,6 +11,7 @@ mod html;
 pub mod papers;
 mod recognised;
 pub mod render;
+mod verification;
 
 use std::path::Path;
 
@@ -30,6 +31,7 @@ pub use casting::{
 };
 pub use checks::{Check, Limits, judge};
 pub use html::to_html;
+pub use verification::{LoadCaseBlock, ProposalBlock, VerifyBlock};
 
 use crate::io::{IoError, atomic_write};
 use render::PictureSize;

@@ -252,8 +252,15 @@ pub const ALL: &[Paper] = &[
         key: "adams2003",
         citation: "M. Adams, M. Brezina, J. Hu, R. Tuminaro (2003): Parallel multigrid smoothing: polynomial versus Gauss-Seidel. Journal of Computational Physics 188.",
         doi: "10.1016/S0021-9991(03)00194-3",
-        stages: &["optimize"],
+        stages: &["optimize", "verify"],
         used_for: "the smoother of the multigrid solver",
+    },
+    Paper {
+        key: "parvizian2007",
+        citation: "J. Parvizian, A. Duester, E. Rank (2007): Finite cell method: h- and p-extension for embedded domain problems in solid mechanics. Computational Mechanics 41.",
+        doi: "10.1007/s00466-007-0173-y",
+        stages: &["verify"],
+        used_for: "voxels that a surface cuts count by their share of material",
     },
 ];
 

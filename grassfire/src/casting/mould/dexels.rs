@@ -20,6 +20,19 @@ pub struct Dexels {
     pub intervals: Vec<[f64; 2]>,
 }
 
+/// Where lines lie.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Lattice {
+    /// Axes: across, across, along; orthonormal.
+    pub axes: [Vec3; 3],
+    /// Place of the first line on the two axes across, mm.
+    pub origin: [f64; 2],
+    /// Distance of lines, mm.
+    pub pitch: f64,
+    /// Lines along the two axes across.
+    pub dims: [usize; 2],
+}
+
 impl Dexels {
     /// Intervals of line `line`, ascending.
     pub fn line(&self, line: usize) -> &[[f64; 2]] {
@@ -58,20 +71,13 @@ pub fn axes(direction: &Vec3) -> [Vec3; 3] {
     [across, direction.cross(&across), *direction]
 }
 
-/// Cuts a closed mesh into intervals along the unit vector `direction`, with `count` lines along its longer side.
-///
-/// Each triangle is drawn onto the lattice; a line lies in it when it lies on the inner side of all three edges. An edge is
-/// judged with its ends in a fixed order, so that its two triangles never both take or both miss a line. Along a line the
-/// winding number tells what is inside: overlapping bodies count once. O(triangles + hits log hits).
+/// Cuts a closed mesh into intervals along the unit vector `direction`, with `count` lines along its longer side; see
+/// [`dexels_on`].
 pub fn dexels(mesh: &TriMesh, direction: &Vec3, count: usize) -> Dexels {
     let axes = axes(direction);
-    let points: Vec<Vec3> = mesh
-        .points
-        .iter()
-        .map(|p| Vec3::new(p.dot(&axes[0]), p.dot(&axes[1]), p.dot(&axes[2])))
-        .collect();
-    let used = mesh.triangles.iter().flatten().map(|&v| points[v as usize]);
-    let bounds = used.fold(None, |bounds: Option<(Vec3, Vec3)>, p| {
+    let used = mesh.triangles.iter().flatten();
+    let places = used.map(|&v| along(&axes, &mesh.points[v as usize]));
+    let bounds = places.fold(None, |bounds: Option<(Vec3, Vec3)>, p| {
         Some(bounds.map_or((p, p), |(lo, hi)| (lo.inf(&p), hi.sup(&p))))
     });
     let Some((lo, hi)) = bounds else {
@@ -83,8 +89,28 @@ pub fn dexels(mesh: &TriMesh, direction: &Vec3, count: usize) -> Dexels {
     };
     let size = hi - lo;
     let pitch = (size.x.max(size.y) / count.max(1) as f64).max(1e-12);
-    let dims = [size.x, size.y].map(|s| (s / pitch).ceil().max(1.0) as usize);
-    let origin = [lo.x + SHIFT[0] * pitch, lo.y + SHIFT[1] * pitch];
+    let lattice = Lattice {
+        axes,
+        origin: [lo.x + SHIFT[0] * pitch, lo.y + SHIFT[1] * pitch],
+        pitch,
+        dims: [size.x, size.y].map(|s| (s / pitch).ceil().max(1.0) as usize),
+    };
+    dexels_on(mesh, &lattice)
+}
+
+/// Cuts a closed mesh into intervals along the lines of a lattice.
+///
+/// Each triangle is drawn onto the lattice; a line lies in it when it lies on the inner side of all three edges. An edge is
+/// judged with its ends in a fixed order, so that its two triangles never both take or both miss a line. Along a line the
+/// winding number tells what is inside: overlapping bodies count once. O(triangles + hits log hits).
+pub fn dexels_on(mesh: &TriMesh, lattice: &Lattice) -> Dexels {
+    let Lattice {
+        axes,
+        origin,
+        pitch,
+        dims,
+    } = *lattice;
+    let points: Vec<Vec3> = mesh.points.iter().map(|p| along(&axes, p)).collect();
     let mut hits: Vec<(u32, f64, i8)> = Vec::new();
     for triangle in &mesh.triangles {
         draw(triangle, &points, origin, pitch, dims, &mut hits);
@@ -98,7 +124,8 @@ pub fn dexels(mesh: &TriMesh, direction: &Vec3, count: usize) -> Dexels {
         start: Vec::with_capacity(dims[0] * dims[1] + 1),
         intervals: Vec::new(),
     };
-    let least = ROUNDING * size.norm();
+    let size = mesh.bounds().map_or(0.0, |(lo, hi)| (hi - lo).norm());
+    let least = ROUNDING * size;
     let mut next = 0;
     for line in 0..(dims[0] * dims[1]) as u32 {
         out.start.push(out.intervals.len() as u32);
@@ -110,6 +137,11 @@ pub fn dexels(mesh: &TriMesh, direction: &Vec3, count: usize) -> Dexels {
     }
     out.start.push(out.intervals.len() as u32);
     out
+}
+
+/// Coordinates of a point on three axes.
+fn along(axes: &[Vec3; 3], p: &Vec3) -> Vec3 {
+    Vec3::new(p.dot(&axes[0]), p.dot(&axes[1]), p.dot(&axes[2]))
 }
 
 /// Adds what lies inside along one line.

@@ -13,7 +13,7 @@ mod walls;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use dexels::{Dexels, dexels};
+pub use dexels::{Dexels, Lattice, dexels, dexels_on};
 pub use directions::{Direction, best_direction};
 pub use draft::DraftClass;
 pub use repair::{Repair, RepairOptions, Repaired, repair};

@@ -152,6 +152,30 @@ impl Studio {
         self.shoot(&scene, "Solid", caption)
     }
 
+    /// Size of the displacement under a load case, one value in mm a point.
+    pub fn displacement(
+        &self,
+        mesh: &TriMesh,
+        values: &[f64],
+        case: &str,
+    ) -> Result<Picture, RenderError> {
+        let legend = Legend::spanning("displacement, mm", values, ColourMap::Viridis);
+        let scene = measured(smooth(mesh), values, legend);
+        let caption = format!("Size of the displacement under the loads of {case:?}.");
+        self.shoot(&scene, "Displacement", &caption)
+    }
+
+    /// Von Mises stress at the surface, one value in MPa a point; the scale ends at the 99 % value.
+    pub fn stress(&self, mesh: &TriMesh, values: &[f64]) -> Result<Picture, RenderError> {
+        let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+        sorted.sort_by(f64::total_cmp);
+        let most = sorted.get(sorted.len() * 99 / 100).copied().unwrap_or(1.0);
+        let legend = Legend::spanning("von Mises, MPa", &[0.0, most], ColourMap::Viridis);
+        let scene = measured(smooth(mesh), values, legend);
+        let caption = "Von Mises stress in the voxels that the surface cuts, largest over the load cases: a view of where it is high, rough in size.";
+        self.shoot(&scene, "Stress", caption)
+    }
+
     /// Signed distance from the solid to the proposal, one value in voxels a point; the scale is -1..1 voxel. NaN, where
     /// the proposal is not the reference, is grey.
     pub fn error(&self, mesh: &TriMesh, voxels: &[f64]) -> Result<Picture, RenderError> {

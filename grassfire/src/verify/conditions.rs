@@ -1,0 +1,315 @@
+//! Supports and loads on the true surface.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::{Fractions, STAGE, VerifyError};
+use crate::Vec3;
+use crate::case::{Case, CaseError, Places, forces_on};
+use crate::fe::components;
+use crate::mesh::{Bvh, TriMesh};
+use crate::monitor::Monitor;
+use crate::remesh::split_long_edges;
+use crate::topopt::Problem;
+
+/// Pieces of the surface a voxel edge.
+const PIECES: f64 = 3.0;
+/// Tolerances of selections are this share of those on voxels: the surface is known better than their corners.
+const SLACK: f64 = 0.25;
+/// Trilinear weights below this are rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Fixed degrees of freedom and forces of a model.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Conditions {
+    /// Node and component.
+    pub fixed: Vec<([usize; 3], usize)>,
+    /// For every load case the forces on nodes, N.
+    pub loads: Vec<Vec<([usize; 3], [f64; 3])>>,
+}
+
+/// Nodes of a grid that touch material.
+pub(super) struct ActiveNodes {
+    /// In `[z][y][x]` order.
+    pub nodes: Vec<[usize; 3]>,
+    flags: Vec<bool>,
+    counts: [usize; 3],
+}
+
+impl ActiveNodes {
+    pub fn new(grid: &Fractions) -> Self {
+        let counts = grid.dims.map(|n| n + 1);
+        let [nx, ny, _] = grid.dims;
+        let mut flags = vec![false; counts.iter().product()];
+        for (v, _) in grid.values.iter().enumerate().filter(|(_, f)| **f > 0.0) {
+            let at = [v % nx, v / nx % ny, v / (nx * ny)];
+            for c in 0..8 {
+                let [x, y, z] = [0, 1, 2].map(|d| at[d] + (c >> d & 1));
+                flags[(z * counts[1] + y) * counts[0] + x] = true;
+            }
+        }
+        let at = |i: usize| {
+            [
+                i % counts[0],
+                i / counts[0] % counts[1],
+                i / (counts[0] * counts[1]),
+            ]
+        };
+        Self {
+            nodes: (0..flags.len()).filter(|&i| flags[i]).map(at).collect(),
+            flags,
+            counts,
+        }
+    }
+
+    pub fn contains(&self, [x, y, z]: [usize; 3]) -> bool {
+        self.flags[(z * self.counts[1] + y) * self.counts[0] + x]
+    }
+}
+
+/// The surface in small pieces: centres and areas.
+pub(super) struct Pieces {
+    mesh: TriMesh,
+    centres: Vec<Vec3>,
+    areas: Vec<f64>,
+}
+
+impl Pieces {
+    /// Pieces no longer than a third of `h`.
+    pub fn new(mesh: &TriMesh, h: f64) -> Self {
+        let mesh = split_long_edges(mesh, h / PIECES);
+        let corners = (0..mesh.triangles.len()).map(|t| mesh.corners(t));
+        let centres = corners.clone().map(|[a, b, c]| (a + b + c) / 3.0).collect();
+        let areas = corners
+            .map(|[a, b, c]| (b - a).cross(&(c - a)).norm() / 2.0)
+            .collect();
+        Self {
+            mesh,
+            centres,
+            areas,
+        }
+    }
+
+    /// Centres and areas of all pieces.
+    #[cfg(test)]
+    pub fn all(&self) -> Vec<(Vec3, f64)> {
+        self.of(&(0..self.centres.len()).collect::<Vec<_>>())
+    }
+
+    /// Centres and areas of some pieces.
+    fn of(&self, chosen: &[usize]) -> Vec<(Vec3, f64)> {
+        let one = |&i: &usize| (self.centres[i], self.areas[i]);
+        chosen.iter().map(one).collect()
+    }
+}
+
+/// Puts the supports and loads of a case on the surface of a part.
+///
+/// 1. The surface is cut into pieces no longer than a third of a voxel; selections hold pieces.
+/// 2. A support holds the nodes within half a voxel of its pieces, on both sides, so that the held region ends at the
+///    surface on average; and those inside of its selection.
+/// 3. Material that no support holds is taken out of `grid` with a warning.
+/// 4. A load acts on its pieces by area; the force of a piece goes to the corners of its voxel by trilinear weights.
+/// 5. Where a selection meets no surface, the nodes take its place with a warning.
+///
+/// # Errors
+/// [`CaseError::EmptySelection`], [`CaseError::LooseLoad`] and those of selections.
+pub(super) fn on_surface(
+    case: &Case,
+    folder: &Path,
+    mesh: &TriMesh,
+    grid: &mut Fractions,
+    monitor: &Monitor,
+) -> Result<Conditions, VerifyError> {
+    let pieces = Pieces::new(mesh, grid.h);
+    let surface = Places::new(
+        case,
+        folder,
+        pieces.centres.clone(),
+        SLACK * grid.h,
+        monitor,
+    )?;
+    let mut active = ActiveNodes::new(grid);
+    let mut fixed = Vec::new();
+    {
+        let places = node_places(grid, &active);
+        let within = Places::new(case, folder, places.clone(), 0.0, monitor)?;
+        for support in &case.support {
+            let mut held = within.select(&support.on, monitor)?;
+            let chosen = surface.select(&support.on, monitor)?;
+            held.extend(near(&pieces, &chosen, &places, grid.h / 2.0));
+            if held.is_empty() {
+                held = nodes_instead(
+                    case,
+                    folder,
+                    &support.on,
+                    "support",
+                    &places,
+                    grid.h,
+                    monitor,
+                )?;
+            }
+            for axis in support.fix.chars().filter_map(|c| "xyz".find(c)) {
+                fixed.extend(held.iter().map(|&i| (active.nodes[i], axis)));
+            }
+        }
+    }
+    fixed.sort_unstable();
+    fixed.dedup();
+    if drop_loose(grid, &fixed, monitor) {
+        active = ActiveNodes::new(grid);
+        fixed.retain(|(node, _)| active.contains(*node));
+    }
+    let mut loads = Vec::new();
+    for table in &case.case {
+        let mut sums: BTreeMap<[usize; 3], Vec3> = BTreeMap::new();
+        for load in &table.loads {
+            let chosen = surface.select(&load.on, monitor)?;
+            let mut places = pieces.of(&chosen);
+            if places.is_empty() {
+                let nodes = node_places(grid, &active);
+                let found = nodes_instead(case, folder, &load.on, "load", &nodes, grid.h, monitor)?;
+                places = found.iter().map(|&i| (nodes[i], 1.0)).collect();
+            }
+            let first = places[0].0;
+            places.retain(|(p, _)| !weights(grid, &active, p).is_empty());
+            if places.is_empty() {
+                return Err(VerifyError::Case(CaseError::LooseLoad {
+                    name: table.name.clone(),
+                    voxels: 0,
+                    place: first.into(),
+                }));
+            }
+            let forces = forces_on(&places, load)?;
+            spread(grid, &active, &places, &forces, &mut sums);
+        }
+        let forces = sums.into_iter().map(|([z, y, x], f)| ([x, y, z], f.into()));
+        loads.push(forces.collect());
+    }
+    Ok(Conditions { fixed, loads })
+}
+
+fn node_places(grid: &Fractions, active: &ActiveNodes) -> Vec<Vec3> {
+    active.nodes.iter().map(|n| grid.node_place(*n)).collect()
+}
+
+/// Which places lie within `reach` of the chosen pieces.
+fn near(pieces: &Pieces, chosen: &[usize], places: &[Vec3], reach: f64) -> Vec<usize> {
+    let part = TriMesh {
+        points: pieces.mesh.points.clone(),
+        triangles: chosen.iter().map(|&i| pieces.mesh.triangles[i]).collect(),
+        tags: Vec::new(),
+    };
+    let tree = Bvh::new(&part);
+    let Some((low, high)) = tree.bounds() else {
+        return Vec::new();
+    };
+    // Nodes at exactly half a voxel on both sides of a plane would both be held by rounding.
+    let reach = reach * (1.0 + 1e-9);
+    let around = |p: &Vec3| (0..3).all(|d| (low[d] - reach..=high[d] + reach).contains(&p[d]));
+    (0..places.len())
+        .filter(|&i| around(&places[i]) && tree.nearest(&places[i], reach).is_some())
+        .collect()
+}
+
+/// The nodes that a selection holds with the tolerances of voxels: for selections that meet no surface.
+fn nodes_instead(
+    case: &Case,
+    folder: &Path,
+    name: &str,
+    what: &str,
+    nodes: &[Vec3],
+    h: f64,
+    monitor: &Monitor,
+) -> Result<Vec<usize>, VerifyError> {
+    let found = Places::new(case, folder, nodes.to_vec(), h, monitor)?.select(name, monitor)?;
+    if found.is_empty() {
+        return Err(VerifyError::NotOnPart {
+            what: what.to_owned(),
+            name: name.to_owned(),
+        });
+    }
+    let text = format!(
+        "the {what} on {name:?} meets no surface: it acts on {} nodes",
+        found.len()
+    );
+    monitor.warn(STAGE, text);
+    Ok(found)
+}
+
+/// The corners of the voxel around a point that touch material, with trilinear weights that sum to 1; empty when there are
+/// none.
+pub(super) fn weights(grid: &Fractions, active: &ActiveNodes, p: &Vec3) -> Vec<([usize; 3], f64)> {
+    let cell = grid.cell_of(p);
+    let r = (p - grid.origin) / grid.h;
+    let mut out = Vec::with_capacity(8);
+    for corner in 0..8 {
+        let mut weight = 1.0;
+        let node = [0, 1, 2].map(|d| cell[d] + (corner >> d & 1));
+        for d in 0..3 {
+            let t = (r[d] - cell[d] as f64).clamp(0.0, 1.0);
+            weight *= if corner >> d & 1 == 1 { t } else { 1.0 - t };
+        }
+        if weight > ROUNDING && active.contains(node) {
+            out.push((node, weight));
+        }
+    }
+    let sum: f64 = out.iter().map(|(_, w)| w).sum();
+    out.iter_mut().for_each(|(_, w)| *w /= sum);
+    out
+}
+
+/// Adds the forces on places to those on nodes (keys: z, y, x).
+pub(super) fn spread(
+    grid: &Fractions,
+    active: &ActiveNodes,
+    places: &[(Vec3, f64)],
+    forces: &[Vec3],
+    sums: &mut BTreeMap<[usize; 3], Vec3>,
+) {
+    for ((p, _), force) in places.iter().zip(forces) {
+        for ([x, y, z], weight) in weights(grid, active, p) {
+            *sums.entry([z, y, x]).or_default() += weight * force;
+        }
+    }
+}
+
+/// Voxels around a node.
+pub(super) fn around(problem: &Problem, node: [usize; 3]) -> impl Iterator<Item = usize> + '_ {
+    (0..8).filter_map(move |c| {
+        let below = |d: usize| {
+            let i = node[d].checked_sub(c >> d & 1)?;
+            (i < problem.dims[d]).then_some(i)
+        };
+        Some(problem.index([below(0)?, below(1)?, below(2)?]))
+    })
+}
+
+/// Empties pieces without any fixed node; tells whether there were any.
+fn drop_loose(grid: &mut Fractions, fixed: &[([usize; 3], usize)], monitor: &Monitor) -> bool {
+    let solid: Vec<bool> = grid.values.iter().map(|&f| f > 0.0).collect();
+    let (labels, pieces) = components(grid.dims, &solid);
+    let problem = grid.problem();
+    let mut held = vec![false; pieces.len()];
+    for v in fixed.iter().flat_map(|(node, _)| around(&problem, *node)) {
+        if let Some(held) = held.get_mut(labels[v] as usize) {
+            *held = true;
+        }
+    }
+    let mut volume = 0.0;
+    for (value, &label) in grid.values.iter_mut().zip(&labels) {
+        if held.get(label as usize) == Some(&false) {
+            volume += *value * grid.h.powi(3);
+            *value = 0.0;
+        }
+    }
+    let loose = held.iter().filter(|h| !**h).count();
+    // Smaller ones are corners of the surface that only touch an edge of a voxel.
+    if volume > grid.h.powi(3) {
+        let text = format!(
+            "{loose} pieces of {volume:.3} mm3 together hang on no support and are left out"
+        );
+        monitor.warn(STAGE, text);
+    }
+    loose > 0
+}
