@@ -22,7 +22,7 @@ build: setup ## target/release/grassfire
 	@. tools/env.sh
 	$(CARGO) build --release --locked -p grassfire-cli
 
-demo: build ## reconstruct the wishbone: STEP and report in out/wishbone
+demo: build ## optimize, reconstruct and verify a wishbone: STEP and report in out/wishbone
 	@code=0
 	$(GRASSFIRE) demo wishbone -o $(DEMO_OUT) || code=$$?
 	if [ $$code -le 1 ]; then

@@ -3,6 +3,7 @@
 mod about;
 mod args;
 mod case;
+mod demo;
 mod failure;
 mod progress;
 mod run;
@@ -38,7 +39,7 @@ fn dispatch(command: &Command) -> Result<u8, Failure> {
         Command::Reconstruct(args) => return run::reconstruct_command(args),
         Command::Solidify(args) => return run::solidify_command(args),
         Command::Mould(args) => return run::mould_command(args),
-        Command::Demo(args) => return run::demo_command(args),
+        Command::Demo(args) => return demo::command(args),
         Command::Optimize(args) => return case::optimize_command(args),
         Command::Run(args) => return case::run_command(args),
         Command::Verify(args) => return case::verify_command(args),

@@ -1,11 +1,10 @@
 //! Runs a reconstruction and says how it went.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use grassfire::io::atomic_write;
 use grassfire::monitor::Monitor;
 use grassfire::pipeline::{
     Format, Outcome, PipelineError, ReconstructJob, ReconstructOptions, SolidJob, mould_solid,
@@ -14,8 +13,7 @@ use grassfire::pipeline::{
 use grassfire::report;
 
 use crate::args::{
-    DemoArgs, Example, Faces, FileFormat, MouldArgs, Recognise, ReconstructArgs, RunArgs,
-    SolidifyArgs,
+    Faces, FileFormat, MouldArgs, Recognise, ReconstructArgs, RunArgs, SolidifyArgs,
 };
 use crate::failure::{Failure, chain};
 use crate::progress::{Bar, Shared, Talk};
@@ -115,53 +113,6 @@ fn formats(asked: &[FileFormat]) -> String {
     };
     let names: Vec<String> = asked.iter().map(name).collect();
     format!("[{}]", names.join(","))
-}
-
-/// `grassfire demo`: the example's files are part of the program and are written next to the results.
-pub fn demo_command(args: &DemoArgs) -> Result<u8, Failure> {
-    let Example::Wishbone = args.example;
-    let output = args
-        .output
-        .clone()
-        .unwrap_or_else(|| PathBuf::from("out/wishbone"));
-    let options = options(&[], &args.run)?;
-    let input = output.join("input");
-    let part = unpack(
-        &input,
-        "proposal.stl",
-        include_bytes!("../../examples/wishbone-free/proposal.stl"),
-    )?;
-    let bodies = unpack(
-        &input,
-        "non_design.step",
-        include_bytes!("../../examples/wishbone-free/non_design.step"),
-    )?;
-    // STEP files need the CAD kernel.
-    let non_design = if cfg!(feature = "occt") {
-        vec![bodies]
-    } else {
-        Vec::new()
-    };
-    let command = command_line();
-    let job = ReconstructJob {
-        part,
-        non_design,
-        output,
-        command,
-        options,
-        ..ReconstructJob::default()
-    };
-    let work = |monitor: &Monitor| reconstruct(&job, monitor);
-    run(job.options.threads, &job.output, &args.run, work)
-}
-
-fn unpack(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, Failure> {
-    let path = folder.join(name);
-    std::fs::create_dir_all(folder)
-        .map_err(|e| Failure::usage(format!("{}: cannot be made: {e}", folder.display()), None))?;
-    atomic_write(&path, |file| file.write_all(bytes))
-        .map_err(|e| Failure::usage(e.to_string(), None))?;
-    Ok(path)
 }
 
 /// The command line as it stands in the report.

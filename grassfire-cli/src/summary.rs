@@ -149,7 +149,7 @@ fn stiffness(report: &Report) -> Vec<(&'static str, String)> {
     let mut lines = vec![("stiffness", text)];
     if let Some(proposal) = &block.proposal {
         let mut text = format!(
-            "{:.0} mm3, u_max {:.3} mm, U {:.3} J ({:.1} % between grids), c*v {:.1} kJ mm3",
+            "voxels of {:.0} mm3, u_max {:.3} mm, U {:.3} J ({:.1} % between grids), c*v {:.1} kJ mm3",
             proposal.volume,
             proposal.u_max,
             proposal.strain_energy / 1e3,
@@ -157,9 +157,9 @@ fn stiffness(report: &Report) -> Vec<(&'static str, String)> {
             proposal.cv / 1e6
         );
         if let Some(ratio) = proposal.cv_ratio {
-            let _ = write!(text, "; the solid has {ratio:.3} times that");
+            let _ = write!(text, "; at this volume the solid has {ratio:.3} times that");
         }
-        lines.push(("its voxels", text));
+        lines.push(("optimized", text));
     }
     if let (Some(stress), Some(p)) = (block.stress_max, block.stress_place) {
         let margin = match block.yield_margin {

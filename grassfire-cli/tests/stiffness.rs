@@ -100,4 +100,7 @@ fn what_cannot_be_verified_is_refused_and_nothing_is_written() {
     let wrong = ["verify", &plate, "--case", &case, "--proposal", &plate];
     refused(&wrong, "density.vti");
     refused(&["run", &at("none.toml")], "none.toml");
+    // Said before the optimization begins.
+    refused(&["run", &case, "--set", "verify.h=-1"], "verify.h");
+    refused(&["run", &case, "--set", "files.chord=-1"], "files.chord");
 }

@@ -168,6 +168,7 @@ fn examples_are_sound() {
     for name in [
         "wishbone",
         "wishbone-free",
+        "wishbone-thick",
         "cantilever",
         "mbb",
         "l-bracket",

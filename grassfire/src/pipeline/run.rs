@@ -10,12 +10,12 @@ use super::deliver::{self, Delivery};
 use super::error::{PipelineError, StageError};
 use super::optimize::{self, OptimizeJob};
 use super::record::Record;
-use super::{Outcome, ReconstructJob, finish, inputs, rebuild, verify};
+use super::{Outcome, ReconstructJob, exchange, finish, inputs, rebuild, verify};
 use crate::case::Case;
 use crate::io;
 use crate::monitor::{Cancelled, Monitor};
 use crate::report::{InputFile, OptimizeBlock, Picture};
-use crate::verify::VerifyOptions;
+use crate::verify::{VerifyOptions, check_options};
 use crate::voxel::VoxelGrid;
 
 /// Where a run ends.
@@ -61,9 +61,10 @@ const LEFT: [&str; 3] = ["density.vti", "proposal_raw.stl", "history.json"];
 /// The report has the blocks of all of them; their stages keep their names.
 ///
 /// # Errors
-/// [`PipelineError`] names the stage and its cause. When verification fails the report of the part is written before.
+/// [`PipelineError`] names the stage and its cause. A verification that fails is a failed check: the part is written.
 pub fn run(job: &RunJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
     let mut record = Record::start(&job.command);
+    record.stage("options", || check(&job.case))?;
     let options = &job.case.reconstruct.report;
     let (full, cancelled) = optimized(&mut record, job, monitor)?;
     let read = std::mem::take(&mut record.report.inputs);
@@ -88,17 +89,25 @@ pub fn run(job: &RunJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
     let (case, mesh) = (&job.case, &rebuilt.mesh);
     let found = match verify::prove(&mut record, case, folder(job), mesh, Some(&full), monitor) {
         Ok(found) => found,
+        Err(error) if error.is_cancelled() => return Err(error),
         Err(error) => {
-            if !error.is_cancelled() {
-                monitor.warn("verify", format!("failed: {}", error.source));
-                finish(record, &delivery, &pictures, options, monitor)?;
-            }
-            return Err(error);
+            // The part is there and reported: what is missing is its proof.
+            let text = format!("the stiffness could not be computed: {}", error.source);
+            monitor.warn("verify", text.clone());
+            let mut outcome = finish(record, &delivery, &pictures, options, monitor)?;
+            outcome.failed_checks.push(text);
+            return Ok(outcome);
         }
     };
     record.stage("write", || verify::result(&delivery, &found))?;
     pictures.extend(record.stage("pictures", || verify::pictures(&found, mesh, options))?);
     finish(record, &delivery, &pictures, options, monitor)
+}
+
+/// Refuses options of late stages before anything is computed.
+fn check(case: &Case) -> Result<(), StageError> {
+    exchange::check(&case.reconstruct)?;
+    Ok(check_options(&case.verify)?)
 }
 
 fn stopped() -> PipelineError {

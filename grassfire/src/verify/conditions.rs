@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::{Fractions, STAGE, VerifyError};
 use crate::Vec3;
-use crate::case::{Case, CaseError, Places, forces_on};
+use crate::case::{Case, LoadCaseTable, Places, forces_on};
 use crate::fe::components;
 use crate::mesh::{Bvh, TriMesh};
 use crate::monitor::Monitor;
@@ -25,8 +25,11 @@ pub(super) struct Conditions {
     /// Node and component.
     pub fixed: Vec<([usize; 3], usize)>,
     /// For every load case the forces on nodes, N.
-    pub loads: Vec<Vec<([usize; 3], [f64; 3])>>,
+    pub loads: Vec<Forces>,
 }
+
+/// Forces on nodes, N.
+type Forces = Vec<([usize; 3], [f64; 3])>;
 
 /// Nodes of a grid that touch material.
 pub(super) struct ActiveNodes {
@@ -90,16 +93,21 @@ impl Pieces {
         }
     }
 
-    /// Centres and areas of all pieces.
+    /// Points on all pieces with weights.
     #[cfg(test)]
     pub fn all(&self) -> Vec<(Vec3, f64)> {
         self.of(&(0..self.centres.len()).collect::<Vec<_>>())
     }
 
-    /// Centres and areas of some pieces.
+    /// Points on some pieces with weights, mm2: three a piece, exact for quadratic functions, as products of the weights of
+    /// nodes are in a voxel's face.
     fn of(&self, chosen: &[usize]) -> Vec<(Vec3, f64)> {
-        let one = |&i: &usize| (self.centres[i], self.areas[i]);
-        chosen.iter().map(one).collect()
+        let points = |&i: &usize| {
+            let corners = self.mesh.corners(i);
+            let weight = self.areas[i] / 3.0;
+            corners.map(|c| (self.centres[i] + (c - self.centres[i]) / 2.0, weight))
+        };
+        chosen.iter().flat_map(points).collect()
     }
 }
 
@@ -109,11 +117,11 @@ impl Pieces {
 /// 2. A support holds the nodes within half a voxel of its pieces, on both sides, so that the held region ends at the
 ///    surface on average; and those inside of its selection.
 /// 3. Material that no support holds is taken out of `grid` with a warning.
-/// 4. A load acts on its pieces by area; the force of a piece goes to the corners of its voxel by trilinear weights.
+/// 4. A load acts on its pieces by area; the force on a point of a piece goes to the corners of its voxel by trilinear weights.
 /// 5. Where a selection meets no surface, the nodes take its place with a warning.
 ///
 /// # Errors
-/// [`CaseError::EmptySelection`], [`CaseError::LooseLoad`] and those of selections.
+/// [`VerifyError::NotOnPart`], [`VerifyError::LooseLoad`] and those of selections.
 pub(super) fn on_surface(
     case: &Case,
     folder: &Path,
@@ -122,71 +130,120 @@ pub(super) fn on_surface(
     monitor: &Monitor,
 ) -> Result<Conditions, VerifyError> {
     let pieces = Pieces::new(mesh, grid.h);
-    let surface = Places::new(
+    let centres = pieces.centres.clone();
+    let surface = Places::new(case, folder, centres, SLACK * grid.h, monitor)?;
+    let site = Site {
         case,
         folder,
-        pieces.centres.clone(),
-        SLACK * grid.h,
+        pieces: &pieces,
+        surface: &surface,
         monitor,
-    )?;
+    };
     let mut active = ActiveNodes::new(grid);
-    let mut fixed = Vec::new();
-    {
-        let places = node_places(grid, &active);
-        let within = Places::new(case, folder, places.clone(), 0.0, monitor)?;
-        for support in &case.support {
-            let mut held = within.select(&support.on, monitor)?;
-            let chosen = surface.select(&support.on, monitor)?;
-            held.extend(near(&pieces, &chosen, &places, grid.h / 2.0));
+    let mut fixed = site.supports(grid, &active)?;
+    if drop_loose(grid, &fixed, monitor) {
+        active = ActiveNodes::new(grid);
+        fixed.retain(|(node, _)| active.contains(*node));
+    }
+    let loads = case
+        .case
+        .iter()
+        .map(|table| site.loads(table, grid, &active));
+    Ok(Conditions {
+        loads: loads.collect::<Result<_, _>>()?,
+        fixed,
+    })
+}
+
+/// What supports and loads are put on.
+struct Site<'a> {
+    case: &'a Case,
+    folder: &'a Path,
+    pieces: &'a Pieces,
+    surface: &'a Places<'a>,
+    monitor: &'a Monitor,
+}
+
+impl Site<'_> {
+    /// Fixed nodes and components, ascending.
+    fn supports(
+        &self,
+        grid: &Fractions,
+        active: &ActiveNodes,
+    ) -> Result<Vec<([usize; 3], usize)>, VerifyError> {
+        let places = node_places(grid, active);
+        let within = Places::new(self.case, self.folder, places.clone(), 0.0, self.monitor)?;
+        let mut fixed = Vec::new();
+        for support in &self.case.support {
+            let mut held = within.select(&support.on, self.monitor)?;
+            let chosen = self.surface.select(&support.on, self.monitor)?;
+            held.extend(near(self.pieces, &chosen, &places, grid.h / 2.0));
             if held.is_empty() {
-                held = nodes_instead(
-                    case,
-                    folder,
-                    &support.on,
-                    "support",
-                    &places,
-                    grid.h,
-                    monitor,
-                )?;
+                held = self.nodes_instead(&support.on, "support", &places, grid.h)?;
             }
             for axis in support.fix.chars().filter_map(|c| "xyz".find(c)) {
                 fixed.extend(held.iter().map(|&i| (active.nodes[i], axis)));
             }
         }
+        fixed.sort_unstable();
+        fixed.dedup();
+        Ok(fixed)
     }
-    fixed.sort_unstable();
-    fixed.dedup();
-    if drop_loose(grid, &fixed, monitor) {
-        active = ActiveNodes::new(grid);
-        fixed.retain(|(node, _)| active.contains(*node));
-    }
-    let mut loads = Vec::new();
-    for table in &case.case {
+
+    /// Forces of one load case on nodes.
+    fn loads(
+        &self,
+        table: &LoadCaseTable,
+        grid: &Fractions,
+        active: &ActiveNodes,
+    ) -> Result<Forces, VerifyError> {
         let mut sums: BTreeMap<[usize; 3], Vec3> = BTreeMap::new();
         for load in &table.loads {
-            let chosen = surface.select(&load.on, monitor)?;
-            let mut places = pieces.of(&chosen);
+            let chosen = self.surface.select(&load.on, self.monitor)?;
+            let mut places = self.pieces.of(&chosen);
             if places.is_empty() {
-                let nodes = node_places(grid, &active);
-                let found = nodes_instead(case, folder, &load.on, "load", &nodes, grid.h, monitor)?;
+                let nodes = node_places(grid, active);
+                let found = self.nodes_instead(&load.on, "load", &nodes, grid.h)?;
                 places = found.iter().map(|&i| (nodes[i], 1.0)).collect();
             }
             let first = places[0].0;
-            places.retain(|(p, _)| !weights(grid, &active, p).is_empty());
+            places.retain(|(p, _)| !weights(grid, active, p).is_empty());
             if places.is_empty() {
-                return Err(VerifyError::Case(CaseError::LooseLoad {
+                return Err(VerifyError::LooseLoad {
                     name: table.name.clone(),
-                    voxels: 0,
                     place: first.into(),
-                }));
+                });
             }
             let forces = forces_on(&places, load)?;
-            spread(grid, &active, &places, &forces, &mut sums);
+            spread(grid, active, &places, &forces, &mut sums);
         }
-        let forces = sums.into_iter().map(|([z, y, x], f)| ([x, y, z], f.into()));
-        loads.push(forces.collect());
+        let forces = sums.into_iter();
+        Ok(forces.map(|([z, y, x], f)| ([x, y, z], f.into())).collect())
     }
-    Ok(Conditions { fixed, loads })
+
+    /// The nodes that a selection holds with the tolerances of voxels: for selections that meet no surface.
+    fn nodes_instead(
+        &self,
+        name: &str,
+        what: &'static str,
+        nodes: &[Vec3],
+        h: f64,
+    ) -> Result<Vec<usize>, VerifyError> {
+        let places = Places::new(self.case, self.folder, nodes.to_vec(), h, self.monitor)?;
+        let found = places.select(name, self.monitor)?;
+        if found.is_empty() {
+            return Err(VerifyError::NotOnPart {
+                what,
+                name: name.to_owned(),
+            });
+        }
+        let text = format!(
+            "the {what} on {name:?} meets no surface: it acts on {} nodes",
+            found.len()
+        );
+        self.monitor.warn(STAGE, text);
+        Ok(found)
+    }
 }
 
 fn node_places(grid: &Fractions, active: &ActiveNodes) -> Vec<Vec3> {
@@ -210,31 +267,6 @@ fn near(pieces: &Pieces, chosen: &[usize], places: &[Vec3], reach: f64) -> Vec<u
     (0..places.len())
         .filter(|&i| around(&places[i]) && tree.nearest(&places[i], reach).is_some())
         .collect()
-}
-
-/// The nodes that a selection holds with the tolerances of voxels: for selections that meet no surface.
-fn nodes_instead(
-    case: &Case,
-    folder: &Path,
-    name: &str,
-    what: &str,
-    nodes: &[Vec3],
-    h: f64,
-    monitor: &Monitor,
-) -> Result<Vec<usize>, VerifyError> {
-    let found = Places::new(case, folder, nodes.to_vec(), h, monitor)?.select(name, monitor)?;
-    if found.is_empty() {
-        return Err(VerifyError::NotOnPart {
-            what: what.to_owned(),
-            name: name.to_owned(),
-        });
-    }
-    let text = format!(
-        "the {what} on {name:?} meets no surface: it acts on {} nodes",
-        found.len()
-    );
-    monitor.warn(STAGE, text);
-    Ok(found)
 }
 
 /// The corners of the voxel around a point that touch material, with trilinear weights that sum to 1; empty when there are

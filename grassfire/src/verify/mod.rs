@@ -129,7 +129,11 @@ pub enum VerifyError {
     #[error("the solid is empty")]
     Empty,
     #[error("the {what} on {name:?} meets neither the surface of the part nor a node near it")]
-    NotOnPart { what: String, name: String },
+    NotOnPart { what: &'static str, name: String },
+    #[error(
+        "the load {name:?} acts near {place:?} mm on a piece of the part that no support holds"
+    )]
+    LooseLoad { name: String, place: [f64; 3] },
     #[error(
         "the proposal has {dims:?} voxels of {h} mm, the project file asks for {wanted:?} of {wanted_h} mm, or they lie elsewhere"
     )]
@@ -162,6 +166,7 @@ impl VerifyError {
             Self::NotOnPart { .. } => {
                 Some("is the solid in the place and unit that the project file is about?".into())
             }
+            Self::LooseLoad { .. } => Some("join the pieces of the part".into()),
             Self::Proposal { .. } => {
                 Some("give the density.vti of `grassfire optimize` on the same project file".into())
             }
@@ -195,7 +200,7 @@ pub fn verify(
     monitor: &Monitor,
 ) -> Result<Verified, VerifyError> {
     let options = &case.verify;
-    check(options)?;
+    check_options(options)?;
     let solver = SolverOptions {
         tolerance: options.tolerance,
         ..case.solver.clone()
@@ -292,7 +297,11 @@ pub fn space(case: &Case, folder: &Path, monitor: &Monitor) -> Result<f64, Verif
     Ok(active.count() as f64 * problem.h.powi(3))
 }
 
-fn check(options: &VerifyOptions) -> Result<(), VerifyError> {
+/// Refuses options out of range.
+///
+/// # Errors
+/// [`VerifyError::Option`].
+pub fn check_options(options: &VerifyOptions) -> Result<(), VerifyError> {
     let bad = |name, value, wanted| {
         Err(VerifyError::Option {
             name,
