@@ -14,8 +14,9 @@ use crate::topopt::Problem;
 
 /// Pieces of the surface a voxel edge.
 const PIECES: f64 = 3.0;
-/// Tolerances of selections are this share of those on voxels: the surface is known better than their corners.
-const SLACK: f64 = 0.25;
+/// Tolerances of selections are this share of those on voxels: the surface is known better than their corners, and pieces
+/// of the faces beside a selected one must not be taken with it.
+const SLACK: f64 = 0.1;
 /// Trilinear weights below this are rounding.
 const ROUNDING: f64 = 1e-9;
 
