@@ -131,13 +131,12 @@ pub(super) fn on_surface(
     monitor: &Monitor,
 ) -> Result<Conditions, VerifyError> {
     let pieces = Pieces::new(mesh, grid.h);
-    let centres = pieces.centres.clone();
-    let surface = Places::new(case, folder, centres, SLACK * grid.h, monitor)?;
+    let corners = pieces.mesh.points.clone();
     let site = Site {
         case,
         folder,
         pieces: &pieces,
-        surface: &surface,
+        corners: &Places::new(case, folder, corners, SLACK * grid.h, monitor)?,
         monitor,
     };
     let mut active = ActiveNodes::new(grid);
@@ -161,11 +160,22 @@ struct Site<'a> {
     case: &'a Case,
     folder: &'a Path,
     pieces: &'a Pieces,
-    surface: &'a Places<'a>,
+    /// Selections on the corners of the pieces.
+    corners: &'a Places<'a>,
     monitor: &'a Monitor,
 }
 
 impl Site<'_> {
+    /// The pieces whose corners are all selected: those of a face beside a selected plane have one that is not.
+    fn chosen(&self, name: &str) -> Result<Vec<usize>, VerifyError> {
+        let corners = self.corners.select(name, self.monitor)?;
+        let mut held = vec![false; self.pieces.mesh.points.len()];
+        corners.into_iter().for_each(|c| held[c] = true);
+        let triangles = self.pieces.mesh.triangles.iter().enumerate();
+        let whole = triangles.filter(|(_, t)| t.iter().all(|&c| held[c as usize]));
+        Ok(whole.map(|(i, _)| i).collect())
+    }
+
     /// Fixed nodes and components, ascending.
     fn supports(
         &self,
@@ -177,7 +187,7 @@ impl Site<'_> {
         let mut fixed = Vec::new();
         for support in &self.case.support {
             let mut held = within.select(&support.on, self.monitor)?;
-            let chosen = self.surface.select(&support.on, self.monitor)?;
+            let chosen = self.chosen(&support.on)?;
             held.extend(near(self.pieces, &chosen, &places, grid.h / 2.0));
             if held.is_empty() {
                 held = self.nodes_instead(&support.on, "support", &places, grid.h)?;
@@ -200,7 +210,7 @@ impl Site<'_> {
     ) -> Result<Forces, VerifyError> {
         let mut sums: BTreeMap<[usize; 3], Vec3> = BTreeMap::new();
         for load in &table.loads {
-            let chosen = self.surface.select(&load.on, self.monitor)?;
+            let chosen = self.chosen(&load.on)?;
             let mut places = self.pieces.of(&chosen);
             if places.is_empty() {
                 let nodes = node_places(grid, active);
