@@ -1,6 +1,6 @@
 #!/bin/bash
 # Installs what grassfire needs to build and is missing: a C++ compiler, OpenCASCADE's headers, Rust.
-# With the word "test" also what the outside checks need: Python with venv, and the libraries that gmsh's wheel links to.
+# With the word "test" also what the outside checks need: Python with venv, the libraries that gmsh's wheel links to, CalculiX.
 # Does nothing, and needs neither root nor network, when all is there.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -36,6 +36,8 @@ if [ "${1:-}" = test ]; then
   loadable libXinerama.so.1    || packages+=(libxinerama1)
   loadable libXrender.so.1     || packages+=(libxrender1)
   loadable libfontconfig.so.1  || packages+=(libfontconfig1)
+  # Solves our tetrahedra once more.
+  command -v ccx >/dev/null 2>&1 || packages+=(calculix-ccx)
 fi
 need_rust=
 command -v cargo >/dev/null 2>&1 || need_rust=yes

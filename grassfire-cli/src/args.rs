@@ -226,7 +226,8 @@ const VERIFY_EXAMPLES: &str = "\
 Examples:
   grassfire verify part.step --case case.toml -o out
   grassfire verify part.step --case case.toml --proposal opt/density.vti -o out
-  grassfire verify case.toml -o out                   the part.step and density.vti in out";
+  grassfire verify case.toml -o out                   the part.step and density.vti in out
+  grassfire verify case.toml -o out --solver ccx      on tetrahedra too, beside CalculiX";
 
 /// Arguments of `verify`.
 #[derive(Debug, Args)]
@@ -240,12 +241,27 @@ pub struct VerifyArgs {
     /// The density.vti of `optimize` on the same project file: its full voxels are loaded too
     #[arg(long, value_name = "FILE")]
     pub proposal: Option<PathBuf>,
+    /// Verify on body-fitted ten-node tetrahedra too (needs gmsh)
+    #[arg(long)]
+    pub tetrahedra: bool,
+    /// Who solves the tetrahedra: grassfire alone, or CalculiX too, with a comparison (needs ccx)
+    #[arg(long, value_enum, value_name = "SOLVER", default_value = "own")]
+    pub solver: TetSolver,
     /// Folder for the results; made when missing
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// What all runs share.
     #[command(flatten)]
     pub run: RunArgs,
+}
+
+/// Who solves the tetrahedra.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TetSolver {
+    /// grassfire
+    Own,
+    /// grassfire and CalculiX
+    Ccx,
 }
 
 /// Arguments of `check`.

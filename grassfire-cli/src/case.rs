@@ -7,7 +7,7 @@ use grassfire::case::{Built, Case, CaseError};
 use grassfire::monitor::Monitor;
 use grassfire::pipeline::{self, OptimizeJob, RunJob, Stage, VerifyJob};
 
-use crate::args::{CaseArgs, ChainArgs, ChainEnd, CheckArgs, RunArgs, VerifyArgs};
+use crate::args::{CaseArgs, ChainArgs, ChainEnd, CheckArgs, RunArgs, TetSolver, VerifyArgs};
 use crate::failure::{Failure, chain};
 use crate::{run, settings};
 
@@ -114,7 +114,10 @@ pub fn verify_command(args: &VerifyArgs) -> Result<u8, Failure> {
             (args.input.clone(), part, proposal)
         }
     };
-    let case = load(&path, &args.run)?;
+    let mut case = load(&path, &args.run)?;
+    let ccx = args.solver == TetSolver::Ccx;
+    case.verify.tetrahedra.enabled |= args.tetrahedra || ccx;
+    case.verify.tetrahedra.calculix |= ccx;
     let job = VerifyJob {
         case,
         path,

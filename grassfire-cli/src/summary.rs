@@ -161,6 +161,21 @@ fn stiffness(report: &Report) -> Vec<(&'static str, String)> {
         }
         lines.push(("optimized", text));
     }
+    if let Some(tets) = &block.tetrahedra {
+        let mut text = format!(
+            "{} ten-node elements of {:.2} mm, u_max {:.3} mm, U {:.3} J ({:.1} % between meshes); the voxels have {:.4} times that",
+            tets.elements,
+            tets.size,
+            tets.u_max,
+            tets.strain_energy / 1e3,
+            100.0 * tets.energy_error_estimate,
+            tets.voxel_ratio
+        );
+        if let Some(theirs) = tets.calculix_strain_energy {
+            let _ = write!(text, ", CalculiX {:.7}", theirs / tets.strain_energy);
+        }
+        lines.push(("tets", text));
+    }
     if let (Some(stress), Some(p)) = (block.stress_max, block.stress_place) {
         let margin = match block.yield_margin {
             Some(margin) => format!(", margin to yield {:+.0} %", 100.0 * margin),

@@ -27,6 +27,7 @@ pub mod remesh;
 pub mod report;
 pub mod skeleton;
 pub mod spline;
+pub mod tet;
 pub mod thicken;
 pub mod topopt;
 pub mod verify;

@@ -21,6 +21,7 @@ mod record;
 mod run;
 mod shape;
 mod short_edges;
+mod tetrahedra;
 mod union;
 mod verify;
 

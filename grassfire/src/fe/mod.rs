@@ -24,7 +24,7 @@ mod transfer;
 mod tests;
 
 pub use islands::{Component, components};
-pub use mechanism::{RIGID_MODES, free_modes};
+pub use mechanism::{RIGID_MODES, free_modes, free_modes_of};
 pub use pcg::SolveStats;
 pub use solver::{Solver, VoxelModel, memory_estimate};
 pub use stress::von_mises;

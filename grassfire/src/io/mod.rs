@@ -43,7 +43,7 @@ pub use skeleton::{read_skeleton, read_skeleton_bytes, write_skeleton};
 pub use stl::write_stl;
 pub use threemf_write::{ThreeMfObject, ThreeMfTexts, write_3mf};
 pub use vti_write::write_vti;
-pub use vtu_write::{Hexahedra, write_vtu};
+pub use vtu_write::{Elements, write_vtu};
 
 use crate::mesh::{Repair, TriMesh};
 use crate::monitor::Monitor;

@@ -1,4 +1,4 @@
-//! Hexahedra of a voxel grid as VTK unstructured grid (`.vtu`), compressed.
+//! Finite elements as VTK unstructured grid (`.vtu`), compressed.
 
 use std::io::Write;
 use std::path::Path;
@@ -7,27 +7,36 @@ use super::vti_write::array;
 use super::{IoError, atomic_write};
 use crate::Vec3;
 
-/// Cells of a voxel grid with values.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Hexahedra {
+/// Elements of one kind with values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Elements<const N: usize> {
     /// Nodes, mm.
     pub points: Vec<Vec3>,
-    /// Corners of every cell in the order of VTK: the lower four counter-clockwise, then the upper four.
-    pub cells: Vec<[u32; 8]>,
+    /// Nodes of every element in the order of VTK: 8 of a hexahedron (the lower four counter-clockwise, then the upper
+    /// four), or 10 of a quadratic tetrahedron (corners, then the middles of 01, 12, 20, 03, 13, 23).
+    pub cells: Vec<[u32; N]>,
     /// Vectors on the nodes.
     pub vectors: Vec<(String, Vec<[f32; 3]>)>,
-    /// Values in the cells.
+    /// Values on the nodes.
+    pub node_values: Vec<(String, Vec<f32>)>,
+    /// Values in the elements.
     pub values: Vec<(String, Vec<f32>)>,
 }
 
-/// VTK's number of the hexahedron.
-const HEXAHEDRON: u8 = 12;
+/// VTK's numbers of the hexahedron and of the quadratic tetrahedron, by the number of their nodes.
+const fn kind(nodes: usize) -> u8 {
+    match nodes {
+        8 => 12,
+        10 => 24,
+        _ => panic!("no element with this number of nodes"),
+    }
+}
 
-/// Writes hexahedra with vectors on their nodes and values in their cells: XML with zlib-compressed base64 arrays.
+/// Writes elements with values on their nodes and in them: XML with zlib-compressed base64 arrays.
 ///
 /// # Errors
 /// [`IoError::Write`].
-pub fn write_vtu(path: &Path, grid: &Hexahedra) -> Result<(), IoError> {
+pub fn write_vtu<const N: usize>(path: &Path, grid: &Elements<N>) -> Result<(), IoError> {
     atomic_write(path, |out| {
         writeln!(out, "<?xml version=\"1.0\"?>")?;
         writeln!(
@@ -48,7 +57,7 @@ pub fn write_vtu(path: &Path, grid: &Hexahedra) -> Result<(), IoError> {
         let corners = grid.cells.iter().flatten();
         let bytes = corners.flat_map(|c| i64::from(*c).to_le_bytes()).collect();
         data(out, "Int64", "connectivity", 1, bytes)?;
-        let ends = (1..=grid.cells.len() as i64).map(|n| 8 * n);
+        let ends = (1..=grid.cells.len() as i64).map(|n| N as i64 * n);
         data(
             out,
             "Int64",
@@ -56,11 +65,21 @@ pub fn write_vtu(path: &Path, grid: &Hexahedra) -> Result<(), IoError> {
             1,
             ends.flat_map(i64::to_le_bytes).collect(),
         )?;
-        data(out, "UInt8", "types", 1, vec![HEXAHEDRON; grid.cells.len()])?;
+        data(
+            out,
+            "UInt8",
+            "types",
+            1,
+            vec![const { kind(N) }; grid.cells.len()],
+        )?;
         writeln!(out, "</Cells><PointData>")?;
         for (name, vectors) in &grid.vectors {
             let bytes = vectors.iter().flatten().flat_map(|v| v.to_le_bytes());
             data(out, "Float32", name, 3, bytes.collect())?;
+        }
+        for (name, values) in &grid.node_values {
+            let bytes = values.iter().flat_map(|v| v.to_le_bytes());
+            data(out, "Float32", name, 1, bytes.collect())?;
         }
         writeln!(out, "</PointData><CellData>")?;
         for (name, values) in &grid.values {
@@ -97,11 +116,11 @@ mod tests {
     #[test]
     fn comes_back_as_it_was() {
         // Three cells in a row.
-        let mut grid = Hexahedra::default();
+        let mut points = Vec::new();
         for z in 0..2 {
             for y in 0..2 {
                 for x in 0..4 {
-                    grid.points.push(Vec3::new(
+                    points.push(Vec3::new(
                         0.5 * f64::from(x),
                         0.5 * f64::from(y),
                         1.0 + 0.5 * f64::from(z),
@@ -109,11 +128,15 @@ mod tests {
                 }
             }
         }
-        grid.cells = (0..3_u32)
-            .map(|x| [0, 1, 5, 4, 8, 9, 13, 12].map(|c| c + x))
-            .collect();
-        grid.vectors = vec![("move".into(), vec![[1.0, 2.0, 3.0]; 16])];
-        grid.values = vec![("share".into(), vec![1.0, 0.25, 0.5])];
+        let grid = Elements {
+            points,
+            cells: (0..3_u32)
+                .map(|x| [0, 1, 5, 4, 8, 9, 13, 12].map(|c| c + x))
+                .collect(),
+            vectors: vec![("move".into(), vec![[1.0, 2.0, 3.0]; 16])],
+            node_values: vec![("stress".into(), vec![5.0; 16])],
+            values: vec![("share".into(), vec![1.0, 0.25, 0.5])],
+        };
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("grid.vtu");
         write_vtu(&path, &grid).expect("writable");

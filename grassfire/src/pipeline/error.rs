@@ -18,6 +18,7 @@ use crate::remesh::RemeshError;
 use crate::report::ReportError;
 use crate::skeleton::SkeletonError;
 use crate::spline::SplineError;
+use crate::tet::TetError;
 use crate::thicken::ThickenError;
 use crate::topopt::TopoptError;
 use crate::verify::VerifyError;
@@ -75,6 +76,8 @@ pub enum StageError {
     Topopt(#[from] TopoptError),
     #[error(transparent)]
     Verify(#[from] VerifyError),
+    #[error(transparent)]
+    Tet(#[from] TetError),
     #[error("{} holds no densities; the proposal of a verification is the density.vti of the optimization", path.display())]
     NoDensity { path: PathBuf },
     #[error("{} is a STEP file; the proposal must be a mesh or a density", path.display())]
@@ -118,6 +121,8 @@ impl PipelineError {
                 FeError::NotConverged { .. } | FeError::Factor { .. },
             )) => 3,
             StageError::Verify(_) => 2,
+            StageError::Tet(TetError::NotConverged { .. } | TetError::Factor { .. }) => 3,
+            StageError::Tet(_) => 2,
             _ if matches!(
                 self.stage,
                 "options" | "case" | "read" | "non_design" | "recognise"
@@ -150,6 +155,7 @@ impl PipelineError {
             StageError::Case(e) => e.hint(),
             StageError::Topopt(e) => e.hint(),
             StageError::Verify(e) => e.hint(),
+            StageError::Tet(e) => e.hint(),
             StageError::NoDensity { .. } => Some("leave --proposal out to do without".into()),
             StageError::StepProposal { .. } => {
                 Some("give the optimization result, and this file with --non-design".into())
@@ -194,6 +200,7 @@ impl PipelineError {
                         | VerifyError::Fe(FeError::Cancelled(_))
                         | VerifyError::Remesh(RemeshError::Cancelled(_))
                 )
+                | StageError::Tet(TetError::Cancelled(_) | TetError::Case(CaseError::Cancelled(_)))
                 | StageError::Topopt(
                     TopoptError::Cancelled(_) | TopoptError::Fe(FeError::Cancelled(_))
                 )

@@ -10,7 +10,7 @@ use super::deliver::{self, Delivery};
 use super::error::{PipelineError, StageError};
 use super::optimize::{self, OptimizeJob};
 use super::record::Record;
-use super::{Outcome, ReconstructJob, exchange, finish, inputs, rebuild, verify};
+use super::{Outcome, ReconstructJob, exchange, finish, inputs, rebuild, tetrahedra, verify};
 use crate::case::Case;
 use crate::io;
 use crate::monitor::{Cancelled, Monitor};
@@ -68,7 +68,7 @@ pub fn run(job: &RunJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
     let options = &job.case.reconstruct.report;
     let (full, cancelled) = optimized(&mut record, job, monitor)?;
     let read = std::mem::take(&mut record.report.inputs);
-    let later = files(&[deliver::FILES, &[(verify::RESULT, verify::RESULT_TEXT)]]);
+    let later = files(&[deliver::FILES, verify::RESULTS]);
     record.stage("write", || Delivery::open(&job.output, &later))?;
     let delivery = Delivery::over(&job.output, &files(&[optimize::FILES, &later]));
     if job.to == Stage::Optimize || cancelled {
@@ -100,6 +100,21 @@ pub fn run(job: &RunJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
         }
     };
     record.stage("write", || verify::result(&delivery, &found))?;
+    let part = job.output.join("part.step");
+    if let Err(error) = tetrahedra::prove(
+        &mut record,
+        case,
+        folder(job),
+        &part,
+        mesh,
+        &delivery,
+        monitor,
+    ) {
+        if error.is_cancelled() {
+            return Err(error);
+        }
+        monitor.warn("tetrahedra", format!("left out: {}", error.source));
+    }
     pictures.extend(record.stage("pictures", || verify::pictures(&found, mesh, options))?);
     finish(record, &delivery, &pictures, options, monitor)
 }
@@ -107,7 +122,8 @@ pub fn run(job: &RunJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
 /// Refuses options of late stages before anything is computed.
 fn check(case: &Case) -> Result<(), StageError> {
     exchange::check(&case.reconstruct)?;
-    Ok(check_options(&case.verify)?)
+    check_options(&case.verify)?;
+    Ok(crate::tet::check_options(&case.verify.tetrahedra)?)
 }
 
 fn stopped() -> PipelineError {

@@ -6,9 +6,9 @@ use super::casting::solid;
 use super::deliver::Delivery;
 use super::error::{PipelineError, StageError};
 use super::record::Record;
-use super::{Outcome, SolidJob, finish, inputs};
+use super::{Outcome, SolidJob, finish, inputs, tetrahedra};
 use crate::case::Case;
-use crate::io::{self, Hexahedra, Input, ReadOptions};
+use crate::io::{self, Elements, Input, ReadOptions};
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
 use crate::remesh::split_long_edges;
@@ -38,28 +38,43 @@ pub struct VerifyJob {
 
 /// Files that `verify` writes.
 const FILES: &[(&str, &str)] = &[
-    (RESULT, RESULT_TEXT),
+    RESULTS[0],
+    RESULTS[1],
+    RESULTS[2],
     ("report.html", "report to read"),
     ("report.json", "report for programs"),
     ("manifest.json", "inputs, versions, times"),
 ];
 
 /// Displacement and stress.
-pub(super) const RESULT: &str = "result.vtu";
-/// What it holds.
-pub(super) const RESULT_TEXT: &str =
-    "displacement, von Mises stress and share of material on the finer grid";
+const RESULT: &str = "result.vtu";
+/// Files of the proof, and what they hold.
+pub(super) const RESULTS: &[(&str, &str)] = &[
+    (
+        RESULT,
+        "displacement, von Mises stress and share of material on the finer grid",
+    ),
+    (
+        tetrahedra::RESULT,
+        "displacement and von Mises stress on tetrahedra",
+    ),
+    (tetrahedra::DECK, "the tetrahedra as input of CalculiX"),
+];
 
 /// Computes the stiffness of a finished solid.
 ///
 /// 1. Reads the solid: a mesh is repaired, a STEP file tessellated; and the proposal, when there is one.
 /// 2. Solves the load cases on two grids ([`verify()`]).
-/// 3. Writes result.vtu, pictures, the report.
+/// 3. Does the same on body-fitted tetrahedra when that is asked for ([`crate::tet`]).
+/// 4. Writes result.vtu, tetrahedra.vtu and tetrahedra.inp, pictures, the report.
 ///
 /// # Errors
 /// [`PipelineError`] names the stage and its cause; nothing is written when the input is refused.
 pub fn verify_solid(job: &VerifyJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
     let mut record = Record::start(&job.command);
+    record.stage("options", || {
+        crate::tet::check_options(&job.case.verify.tetrahedra)
+    })?;
     let read = SolidJob {
         part: job.part.clone(),
         options: job.case.reconstruct.clone(),
@@ -87,6 +102,15 @@ pub fn verify_solid(job: &VerifyJob, monitor: &Monitor) -> Result<Outcome, Pipel
     )?;
     let delivery = record.stage("write", || Delivery::open(&job.output, FILES))?;
     record.stage("write", || result(&delivery, &found))?;
+    tetrahedra::prove(
+        &mut record,
+        &job.case,
+        folder,
+        &job.part,
+        &mesh,
+        &delivery,
+        monitor,
+    )?;
     let options = &job.case.reconstruct.report;
     let pictures = record.stage("pictures", || pictures(&found, &mesh, options))?;
     finish(record, &delivery, &pictures, options, monitor)
@@ -192,6 +216,7 @@ fn block(case: &Case, found: &Verified, space: f64) -> VerifyBlock {
         energy_error_estimate: found.energy_error_estimate(),
         cases: fine.cases.iter().map(case_block).collect(),
         proposal,
+        tetrahedra: None,
     }
 }
 
@@ -243,10 +268,11 @@ pub(super) fn result(delivery: &Delivery, found: &Verified) -> Result<(), StageE
         (name, c.displacement.clone())
     });
     let shares = voxels.clone().map(|v| grid.values[v] as f32).collect();
-    let out = Hexahedra {
+    let out = Elements {
         points: fine.nodes.iter().map(|n| grid.node_place(*n)).collect(),
         cells: voxels.map(cell).collect(),
         vectors: vectors.collect(),
+        node_values: Vec::new(),
         values: vec![
             ("von_mises".to_owned(), fine.von_mises.clone()),
             ("share".to_owned(), shares),

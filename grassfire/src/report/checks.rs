@@ -31,6 +31,9 @@ pub struct Limits {
     pub energy_error: f64,
     /// Largest sum of reactions and loads over the loads.
     pub reaction: f64,
+    /// Largest relative difference to the strain energy that CalculiX finds: it prints seven digits, and its iterative solver is
+    /// exact to a millionth or two.
+    pub calculix: f64,
 }
 
 impl Default for Limits {
@@ -45,6 +48,7 @@ impl Default for Limits {
             hot_spot: 1000.0,
             energy_error: 0.05,
             reaction: 1e-3,
+            calculix: 1e-5,
         }
     }
 }

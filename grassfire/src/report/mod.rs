@@ -31,7 +31,7 @@ pub use casting::{
 };
 pub use checks::{Check, Limits, judge};
 pub use html::to_html;
-pub use verification::{LoadCaseBlock, ProposalBlock, VerifyBlock};
+pub use verification::{LoadCaseBlock, ProposalBlock, TetrahedraBlock, VerifyBlock};
 
 use crate::io::{IoError, atomic_write};
 use render::PictureSize;

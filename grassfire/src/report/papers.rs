@@ -262,6 +262,13 @@ pub const ALL: &[Paper] = &[
         stages: &["verify"],
         used_for: "voxels that a surface cuts count by their share of material",
     },
+    Paper {
+        key: "dunavant1985",
+        citation: "D. A. Dunavant (1985): High degree efficient symmetrical Gaussian quadrature rules for the triangle. International Journal for Numerical Methods in Engineering 21.",
+        doi: "10.1002/nme.1620210612",
+        stages: &["tetrahedra"],
+        used_for: "loads on the curved faces of tetrahedra",
+    },
 ];
 
 /// The papers behind `stages`, in the order of [`ALL`].

@@ -65,6 +65,45 @@ pub struct VerifyBlock {
     /// The voxels that the optimization left, under the same loads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proposal: Option<ProposalBlock>,
+    /// The same solid on body-fitted tetrahedra.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tetrahedra: Option<TetrahedraBlock>,
+}
+
+/// The solid on body-fitted ten-node tetrahedra; figures of the finer mesh.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct TetrahedraBlock {
+    /// Edge asked for, mm.
+    pub size: f64,
+    /// Edge of the coarser mesh, mm.
+    pub size_coarse: f64,
+    /// Elements.
+    pub elements: usize,
+    /// Their nodes.
+    pub nodes: usize,
+    /// Volume, mm3.
+    pub volume: f64,
+    /// Half of f'u, weighted sum of the cases, mJ.
+    pub strain_energy: f64,
+    /// The same on the coarser mesh; the energy of finer meshes is larger.
+    pub strain_energy_coarse: f64,
+    /// Relative difference of the two.
+    pub energy_error_estimate: f64,
+    /// Strain energy on the finer voxels over that on these tetrahedra.
+    pub voxel_ratio: f64,
+    /// Largest displacement of all cases, mm.
+    pub u_max: f64,
+    /// Largest von Mises stress at a Gauss point away from held nodes, MPa.
+    pub stress_max: f64,
+    /// Where, mm.
+    pub stress_place: [f64; 3],
+    /// Sum of reactions and loads over the loads, largest of the cases.
+    pub reaction_error: f64,
+    /// Iterations of the solver, all cases.
+    pub iterations: usize,
+    /// Strain energy that CalculiX finds on the same mesh, mJ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calculix_strain_energy: Option<f64>,
 }
 
 /// One load case.
@@ -133,6 +172,30 @@ pub(super) fn judge(report: &Report, limits: &Limits, checks: &mut Vec<Check>) {
         limit,
         "%",
     ));
+    let Some(tets) = &block.tetrahedra else {
+        return;
+    };
+    let text = "Strain energy on voxels and on tetrahedra, relative difference";
+    let percent = 100.0 * (tets.voxel_ratio - 1.0).abs();
+    checks.push(check(
+        "verify.tetrahedra.voxel_ratio",
+        text,
+        percent,
+        limit,
+        "%",
+    ));
+    if let Some(theirs) = tets.calculix_strain_energy {
+        let text = "Strain energy of CalculiX on the same tetrahedra, relative difference";
+        let error = (tets.strain_energy / theirs - 1.0).abs();
+        let limit = limits.calculix;
+        checks.push(check(
+            "verify.tetrahedra.calculix_strain_energy",
+            text,
+            error,
+            limit,
+            "",
+        ));
+    }
 }
 
 /// The section of the page, when the report has the block.
@@ -176,6 +239,16 @@ pub(super) fn section(report: &Report) -> Markup {
                     }
                 }
             } }
+        }
+        @if let Some(tets) = &block.tetrahedra {
+            p {
+                "On " (count(tets.elements)) " ten-node tetrahedra of " (with_unit(tets.size, 3, "mm")) " (a mesh of gmsh): "
+                (joules(tets.strain_energy)) ", " (with_unit(tets.u_max, 4, "mm")) ", von Mises stress up to "
+                (with_unit(tets.stress_max, 3, "MPa")) " at " (place(&tets.stress_place)) "; "
+                (with_unit(100.0 * tets.energy_error_estimate, 3, "%")) " between meshes. The voxels have "
+                (number(tets.voxel_ratio, 4)) " times this energy."
+                @if let Some(theirs) = tets.calculix_strain_energy { " CalculiX finds " (with_unit(theirs / 1e3, 7, "J")) " on the same mesh." }
+            }
         }
         @if let Some(other) = &block.proposal {
             p {

@@ -27,6 +27,7 @@ use crate::fe::{FeError, SolverOptions};
 use crate::mesh::TriMesh;
 use crate::monitor::{Cancelled, Monitor};
 use crate::remesh::RemeshError;
+use crate::tet::TetOptions;
 use crate::voxel::VoxelGrid;
 use grids::Layout;
 
@@ -51,6 +52,8 @@ pub struct VerifyOptions {
     pub tolerance: f64,
     /// Volume at which stiffness is compared, mm3. Default: that of the proposal, else the fraction of the optimization.
     pub equal_volume: Option<f64>,
+    /// Body-fitted tetrahedra beside the voxels.
+    pub tetrahedra: TetOptions,
 }
 
 impl Default for VerifyOptions {
@@ -63,6 +66,7 @@ impl Default for VerifyOptions {
             alpha: 1e-6,
             tolerance: 1e-6,
             equal_volume: None,
+            tetrahedra: TetOptions::default(),
         }
     }
 }
