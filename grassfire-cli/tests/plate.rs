@@ -55,6 +55,26 @@ fn plate_becomes_a_good_part() {
     }
 }
 
+/// One corner gets thicker, the far one stays; an edit of a place without skeleton is refused before anything is written.
+#[test]
+fn edits_thicken_their_place_only() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let half = r#"edits=[{"within":{"box":{"min":[-100,-100,-100],"max":[100,-10,100]}},"scale":1.3}]"#;
+    let run_with = |edits: &str| run(folder.path(), &["--recognise", "off", "--set", edits]);
+    let report = run_with(half).report();
+    let edits = &report["edits"];
+    assert!(number(edits, "/edits/0/points") >= 4.0, "{edits}");
+    let radii = ["mean_before", "mean_after"].map(|key| number(edits, &format!("/edits/0/{key}")));
+    assert!((radii[1] / radii[0] - 1.3).abs() < 1e-9, "{radii:?}");
+    let grown = number(edits, "/volume_after") / number(edits, "/volume_before");
+    assert!((1.03..1.25).contains(&grown), "{grown}");
+    assert!(number(&report, "/volume/relative_difference").abs() < 0.02);
+    let nowhere = r#"edits=[{"within":{"sphere":{"centre":[500,0,0],"radius":1}},"scale":1.3}]"#;
+    let refused = run_with(nowhere);
+    assert_eq!(refused.code, Some(2), "{}", refused.stderr);
+    assert!(refused.stderr.contains("mm away"), "{}", refused.stderr);
+}
+
 #[test]
 fn skeleton_comes_back_as_ply_and_as_obj() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -8,6 +8,7 @@ mod case_bodies;
 mod casting;
 mod construct;
 mod deliver;
+mod edits;
 mod error;
 mod exchange;
 mod feeding;
@@ -43,6 +44,7 @@ use crate::case::Body;
 use crate::casting::feed::FeedOptions;
 use crate::casting::mould::MouldOptions;
 use crate::casting::solidify::SolidifyOptions;
+use crate::edit::RadiusEdit;
 use crate::fit::FitOptions;
 use crate::io::ReadOptions;
 use crate::medial::{self, MedialOptions, PoleOptions};
@@ -87,6 +89,8 @@ pub struct ReconstructOptions {
     pub thicken: ThickenOptions,
     /// Fit to the proposal.
     pub fit: FitOptions,
+    /// Edits of the radii of the proposal's skeleton, in their order.
+    pub edits: Vec<RadiusEdit>,
     /// Sections that grow towards the feeders.
     pub feed: FeedOptions,
     /// What to do when a body cuts itself.
@@ -246,14 +250,17 @@ fn rebuild(
         medial::poles(&remeshed.solid, &options.poles, monitor)
     })?;
     record.stage("write", || delivery.poles(&poles, &remeshed.solid))?;
-    let edited = match drawn {
+    let original = match edits::edited(record, &remeshed, &bodies, options, monitor)? {
+        Some(edited) => edited,
+        None => remeshed,
+    };
+    let fed = match drawn {
         // The radii of a drawn skeleton are what its author wants: they are edited, not the proposal.
         Some(_) => None,
-        None => feeding::edit(record, &remeshed, &bodies, options, monitor)?,
+        None => feeding::edit(record, &original, &bodies, options, monitor)?,
     };
-    let original = remeshed;
-    let remeshed = edited.as_ref().unwrap_or(&original);
-    if edited.is_some() {
+    let remeshed = fed.as_ref().unwrap_or(&original);
+    if fed.is_some() || !options.edits.is_empty() {
         record.stage("write", || {
             delivery.stl("edited.stl", remeshed.solid.mesh())
         })?;

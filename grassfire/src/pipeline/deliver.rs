@@ -27,7 +27,10 @@ pub(super) const FILES: &[(&str, &str)] = &[
     ("poles.ply", "pole skeleton with radii"),
     ("thickness.ply", "proposal with wall thickness"),
     ("proposal.stl", "remeshed proposal"),
-    ("edited.stl", "remeshed proposal after the feeding edit"),
+    (
+        "edited.stl",
+        "remeshed proposal after the edits and the feeding edit",
+    ),
     (
         "design_part.stl",
         "remeshed proposal without its non-design bodies",

@@ -7,7 +7,7 @@ use crate::case::CaseError;
 use crate::casting::feed::FeedError;
 use crate::casting::mould::MouldError;
 use crate::casting::solidify::SolidifyError;
-use crate::edit::EditError;
+use crate::edit::{EditError, EditListError};
 use crate::fe::FeError;
 use crate::fit::FitError;
 use crate::io::IoError;
@@ -58,6 +58,8 @@ pub enum StageError {
     Feed(#[from] FeedError),
     #[error(transparent)]
     Edit(#[from] EditError),
+    #[error(transparent)]
+    Edits(#[from] EditListError),
     #[error(transparent)]
     Mould(#[from] MouldError),
     #[error(transparent)]
@@ -114,7 +116,7 @@ impl PipelineError {
         match self.source {
             StageError::Io(_) | StageError::Repair(_) | StageError::Remesh(_) => 2,
             StageError::Feed(FeedError::Contradiction { .. }) => 3,
-            StageError::Feed(_) => 2,
+            StageError::Feed(_) | StageError::Edits(_) => 2,
             StageError::Solidify(SolidifyError::NotFrozen { .. }) => 3,
             StageError::Solidify(_) | StageError::Mould(_) => 2,
             StageError::Verify(VerifyError::Fe(
@@ -146,6 +148,7 @@ impl PipelineError {
             StageError::Thicken(e) => e.hint(),
             StageError::Feed(e) => e.hint(),
             StageError::Edit(e) => e.hint(),
+            StageError::Edits(e) => e.hint(),
             StageError::Mould(e) => e.hint(),
             StageError::Solidify(e) => e.hint(),
             StageError::Fit(e) => e.hint(),

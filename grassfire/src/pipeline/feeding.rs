@@ -188,7 +188,7 @@ fn cells(mesh: &MedialMesh) -> TriMesh {
 }
 
 /// Takes the free lengths of bores out of a field.
-fn keep_free(field: &mut VoxelGrid<f32>, free: &[Capsule]) {
+pub(super) fn keep_free(field: &mut VoxelGrid<f32>, free: &[Capsule]) {
     for v in 0..field.values.len() {
         let [i, j, k] = field.ijk(v);
         let p = field.centre(i, j, k);
@@ -211,7 +211,7 @@ fn depth_in(bore: &Capsule, p: &Vec3) -> f64 {
 }
 
 /// The solid of a signed distance field.
-fn solid_of(
+pub(super) fn solid_of(
     field: VoxelGrid<f32>,
     bodies: &Bodies,
     options: &ReconstructOptions,
@@ -363,6 +363,15 @@ pub(super) fn prove(
         block.falling = after;
     }
     Ok(())
+}
+
+/// Which points of a skeleton belong to a body.
+pub(super) fn belonging(bodies: &Bodies, points: &[Vec3], radii: &[f64]) -> Vec<bool> {
+    let mut out = vec![false; points.len()];
+    for contact in contacts(bodies, points, radii, &FeedOptions::default(), true) {
+        contact.inside.iter().for_each(|&v| out[v as usize] = true);
+    }
+    out
 }
 
 /// How the bodies touch balls of a skeleton or medial axis, one contact a body.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Check, FeedBlock, MouldBlock, SolidifyBlock, VerifyBlock};
+use super::{Check, EditBlock, FeedBlock, MouldBlock, SolidifyBlock, VerifyBlock};
 use crate::monitor::Warning;
 use crate::remesh::{ChangeKind, TopologyChange};
 use crate::spline::CurvatureJump;
@@ -41,6 +41,9 @@ pub struct Report {
     /// Volume of the solid against the proposal.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume: Option<VolumeBlock>,
+    /// The edits of radii.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub edits: Option<EditBlock>,
     /// The feeding edit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feed: Option<FeedBlock>,

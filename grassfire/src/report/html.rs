@@ -41,6 +41,7 @@ pub fn to_html(report: &Report, pictures: &[Picture]) -> String {
                 @if let Some(block) = &report.solid { (solid(block)) }
                 (fidelity(report))
                 (non_design(&report.non_design))
+                (super::editing::section(report))
                 (super::verification::section(report))
                 (super::casting::sections(report))
                 (super::recognised::section(report))

@@ -6,6 +6,7 @@
 mod blocks;
 mod casting;
 mod checks;
+mod editing;
 mod format;
 mod html;
 pub mod papers;
@@ -30,6 +31,7 @@ pub use casting::{
     UndercutBlock,
 };
 pub use checks::{Check, Limits, judge};
+pub use editing::EditBlock;
 pub use html::to_html;
 pub use verification::{LoadCaseBlock, ProposalBlock, TetrahedraBlock, VerifyBlock};
 
