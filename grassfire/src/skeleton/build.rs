@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::anneal::{Annealing, anneal};
 use super::arcs;
 use super::check::{check, check_cells, check_points};
 use super::coarsen::{Sizing, coarsen};
@@ -11,15 +12,16 @@ use super::edges::edge;
 use super::members::burn_members;
 use super::pairing::{make_even, pair, split_all, split_rims};
 use super::polygons::Polygon;
+use super::quad_mesh::QuadMesh;
 use super::reduce::{collapse_short, prune_spurs};
 use super::reference::Reference;
-use super::square::square_up;
+use super::square::{classes, square_up};
 use super::tidy::Tidy;
 use super::walk::walk_triangles;
 use super::{QuadSkeleton, Skeleton, SkeletonError, stats, topology};
 use crate::Vec3;
 use crate::medial::MedialMesh;
-use crate::monitor::Monitor;
+use crate::monitor::{Cancelled, Monitor};
 use crate::topology::Betti;
 
 const STAGE: &str = "skeleton";
@@ -44,6 +46,10 @@ pub struct SkeletonOptions {
     pub spur: f64,
     /// Smoothing rounds along rims, seams and beams.
     pub smoothing: usize,
+    /// Searches for quads with few irregular vertices; the best one counts, 0 leaves the quads as matched.
+    pub searches: usize,
+    /// Seed of the searches.
+    pub seed: u64,
 }
 
 impl Default for SkeletonOptions {
@@ -57,6 +63,8 @@ impl Default for SkeletonOptions {
             member_size: 4.0,
             spur: 0.6,
             smoothing: 80,
+            searches: 4,
+            seed: 1,
         }
     }
 }
@@ -80,6 +88,12 @@ impl SkeletonOptions {
         not_negative("skeleton.member_width", self.member_width)?;
         not_negative("skeleton.member_size", self.member_size)?;
         not_negative("skeleton.spur", self.spur)?;
+        inside(
+            self.searches <= 1000,
+            "skeleton.searches",
+            self.searches as f64,
+            "0 to 1000",
+        )?;
         inside(
             self.smoothing <= 1000,
             "skeleton.smoothing",
@@ -158,7 +172,7 @@ pub fn quad_skeleton(
     verify("coarsening", c.betti())?;
 
     monitor.step(STAGE, "quads", 0.8)?;
-    let (skeleton, whole) = quads(c, &reference, &sizing, monitor)?;
+    let (skeleton, whole) = quads(c, &reference, &sizing, options, monitor)?;
     if !whole {
         monitor.warn(
             STAGE,
@@ -313,6 +327,7 @@ fn quads(
     mut c: Complex,
     reference: &Reference,
     sizing: &Sizing,
+    options: &SkeletonOptions,
     monitor: &Monitor,
 ) -> Result<(Skeleton, bool), SkeletonError> {
     make_even(&mut c, reference, |c, a, b| sizing.edge(c, a, b));
@@ -334,6 +349,13 @@ fn quads(
         };
         tidy.run(monitor)?;
         (polygons, beams) = (tidy.quads, tidy.beams);
+        let annealing = Annealing {
+            reference,
+            sizing,
+            searches: options.searches,
+            seed: options.seed,
+        };
+        polygons = improve(&mut points, &mut radii, polygons, &beams, &annealing, monitor)?;
         square_up(&mut points, &mut radii, &polygons, &beams, reference);
         whole = !has_twins(&polygons);
     }
@@ -354,6 +376,59 @@ fn quads(
     split_lone_beams(&mut skeleton);
     drop_unused(&mut skeleton);
     Ok((skeleton, whole))
+}
+
+/// Anneals the quads, which stay as they are when their topology would change.
+fn improve(
+    points: &mut Vec<Vec3>,
+    radii: &mut Vec<f64>,
+    polygons: Vec<Option<Polygon>>,
+    beams: &[[u32; 2]],
+    annealing: &Annealing,
+    monitor: &Monitor,
+) -> Result<Vec<Option<Polygon>>, Cancelled> {
+    if annealing.searches == 0 {
+        return Ok(polygons);
+    }
+    let before = quad_mesh(points, radii, &polygons, beams);
+    let m = anneal(&before, annealing, monitor)?;
+    if m.betti() != before.betti() || m.has_twins() {
+        return Ok(polygons);
+    }
+    let out = m
+        .alive()
+        .map(|(i, q)| Some(Polygon::quad(q, m.sheet[i as usize])))
+        .collect();
+    (*points, *radii) = (m.points, m.radii);
+    Ok(out)
+}
+
+fn quad_mesh(
+    points: &[Vec3],
+    radii: &[f64],
+    polygons: &[Option<Polygon>],
+    beams: &[[u32; 2]],
+) -> QuadMesh {
+    let mut m = QuadMesh {
+        points: points.to_vec(),
+        radii: radii.to_vec(),
+        class: classes(points, polygons, beams),
+        beams: vec![Vec::new(); points.len()],
+        quads: Vec::new(),
+        sheet: Vec::new(),
+        around: vec![Vec::new(); points.len()],
+    };
+    for &[a, b] in beams {
+        m.beams[a as usize].push(b);
+        m.beams[b as usize].push(a);
+    }
+    let quads: Vec<([u32; 4], u32)> = polygons
+        .iter()
+        .flatten()
+        .filter_map(|p| p.as_quad().map(|q| (q, p.sheet)))
+        .collect();
+    m.set_quads(&quads);
+    m
 }
 
 /// Two quads over the same four points.
