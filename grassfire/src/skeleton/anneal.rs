@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::body_valence::star;
+use super::body_valence::{Star, star};
 use super::coarsen::Sizing;
 use super::complex::Class;
 use super::quad_mesh::{Change, QuadMesh};
@@ -20,6 +20,8 @@ const MOST_PROPOSALS: usize = 200_000;
 /// Temperatures of the first and last proposal, in irregular body valences.
 const HOT: f64 = 2.5;
 const COLD: f64 = 0.3;
+/// A change may improve the shape of its quads by about this much, so its valences may cost as much more.
+const SLACK: f64 = 4.0;
 /// How often all vertices are put back onto sheets and rims.
 const SETTLINGS: usize = 24;
 
@@ -31,12 +33,18 @@ pub(crate) struct Annealing<'a> {
     pub seed: u64,
 }
 
-/// Several searches from the same mesh; the best one wins, the first of equals.
+/// Several searches from the same mesh; the best one wins, the first of equals. None when none is better.
+///
+/// 1. A proposal turns a side of two quads, collapses a quad along its diagonal, opens one, or shortens a rim.
+/// 2. It must keep fans, rims and seams; then body valences, corners and sizes of the quads around decide (Metropolis).
+/// 3. The temperature falls geometrically; at every leg vertices go back onto sheets and rims, and the best state is kept.
+///
+/// The number of proposals is fixed by the number of quads. The Betti numbers are checked at the end.
 pub(crate) fn anneal(
     mesh: &QuadMesh,
     annealing: &Annealing,
     monitor: &Monitor,
-) -> Result<QuadMesh, Cancelled> {
+) -> Result<Option<QuadMesh>, Cancelled> {
     let found: Result<Vec<(f64, QuadMesh)>, Cancelled> = (0..annealing.searches)
         .into_par_iter()
         .map(|k| {
@@ -45,12 +53,13 @@ pub(crate) fn anneal(
         })
         .collect();
     let mut best = (energy(mesh, annealing.sizing), None);
+    let topology = mesh.betti();
     for (e, m) in found? {
-        if e < best.0 {
+        if e < best.0 && m.betti() == topology && !m.has_twins() {
             best = (e, Some(m));
         }
     }
-    Ok(best.1.unwrap_or_else(|| mesh.clone()))
+    Ok(best.1)
 }
 
 /// Cost of all vertices and quads.
@@ -126,31 +135,38 @@ impl<'a> Search<'a> {
     }
 
     fn attempt(&mut self, change: &Change, temperature: f64) -> bool {
-        let sizing = self.annealing.sizing;
-        let Some(touched) = touched(&self.m, change) else {
-            return false;
-        };
-        let before_arcs = arcs(&self.m, &touched);
-        let before_fans = fans(&self.m, &touched);
-        let (Some(before_fans), Some(before)) =
-            (before_fans, local_energy(&self.m, &touched, sizing))
-        else {
-            return false;
-        };
-        let mut undo = self.m.apply(change);
-        let sound = valid(&self.m, change, &touched, &before_fans)
-            && (change.shortens_rim || arcs(&self.m, &touched) == before_arcs);
-        if sound {
-            smooth_near(&mut self.m, &touched, &mut undo);
-            if let Some(after) = local_energy(&self.m, &touched, sizing) {
-                let worse = after - before;
-                if worse <= 0.0 || self.random.unit() < (-worse / temperature).exp() {
-                    return true;
-                }
-            }
-        }
+        // Metropolis: the worsening that this proposal may bring.
+        let allowance = -temperature * self.random.unit().max(1e-12).ln();
+        self.promising(change, allowance + SLACK)
+            .is_some_and(|touched| self.take(change, &touched, allowance))
+    }
+
+    /// Vertices of a sound change whose valences alone do not cost too much; most proposals end here.
+    fn promising(&mut self, change: &Change, most: f64) -> Option<Vec<u32>> {
+        let touched = touched(&self.m, change)?;
+        let before = stars(&self.m, &touched)?;
+        let arcs_before = arcs(&self.m, &touched);
+        let undo = self.m.apply(change);
+        let good = stars(&self.m, &touched).is_some_and(|after| {
+            cost(&after) - cost(&before) <= most
+                && valid(&self.m, change, &touched, &before, &after)
+                && (change.shortens_rim || arcs(&self.m, &touched) == arcs_before)
+        });
         self.m.undo(undo);
-        false
+        good.then_some(touched)
+    }
+
+    fn take(&mut self, change: &Change, touched: &[u32], allowance: f64) -> bool {
+        let sizing = self.annealing.sizing;
+        let before = local_energy(&self.m, touched, sizing);
+        let mut undo = self.m.apply(change);
+        smooth_near(&mut self.m, touched, &mut undo);
+        let after = local_energy(&self.m, touched, sizing);
+        let good = matches!((before, after), (Some(b), Some(a)) if a - b <= allowance);
+        if !good {
+            self.m.undo(undo);
+        }
+        good
     }
 }
 
@@ -161,7 +177,10 @@ fn touched(m: &QuadMesh, change: &Change) -> Option<Vec<u32>> {
         return None;
     }
     let removed = change.remove.iter().filter_map(|&i| m.quad(i));
-    let mut out: Vec<u32> = removed.chain(change.add.iter().copied()).flatten().collect();
+    let mut out: Vec<u32> = removed
+        .chain(change.add.iter().copied())
+        .flatten()
+        .collect();
     out.sort_unstable();
     out.dedup();
     Some(out)
@@ -180,27 +199,24 @@ fn arcs(m: &QuadMesh, vertices: &[u32]) -> Vec<([u32; 2], usize)> {
     out
 }
 
-/// Fans of each vertex that is not free inside a sheet.
-fn fans(m: &QuadMesh, vertices: &[u32]) -> Option<Vec<usize>> {
-    vertices
-        .iter()
-        .map(|&v| star(m, v).map(|s| s.fans()))
-        .collect()
+fn stars(m: &QuadMesh, vertices: &[u32]) -> Option<Vec<Star>> {
+    vertices.iter().map(|&v| star(m, v)).collect()
 }
 
-/// Does the mesh around a change still have the same shape of sheets, rims and seams?
-fn valid(m: &QuadMesh, change: &Change, touched: &[u32], before: &[usize]) -> bool {
-    for (&v, &fans) in touched.iter().zip(before) {
+fn cost(stars: &[Star]) -> f64 {
+    stars.iter().map(Star::cost).sum()
+}
+
+/// Does the mesh around a change still have the same sheets, and valid quads?
+fn valid(m: &QuadMesh, change: &Change, touched: &[u32], before: &[Star], after: &[Star]) -> bool {
+    for ((&v, old), new) in touched.iter().zip(before).zip(after) {
         let class = m.class[v as usize];
-        let Some(s) = star(m, v) else { return false };
-        if s.fans() == 0 {
+        if new.fans() == 0 {
             // Gone; a vertex that something else holds must stay.
             if !m.beams[v as usize].is_empty() || !matches!(class, Class::Interior | Class::Rim) {
                 return false;
             }
-            continue;
-        }
-        if !s.valid(class) || fans != 0 && s.fans() != fans {
+        } else if !new.valid(class) || old.fans() != 0 && new.fans() != old.fans() {
             return false;
         }
     }
@@ -246,5 +262,124 @@ impl Random {
 
     fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::arcs;
+    use super::super::complex::Complex;
+    use super::super::polygons::Polygon;
+    use super::*;
+    use crate::Vec3;
+
+    const N: u32 = 8;
+
+    fn reference() -> Reference {
+        let n = 4 * N + 1;
+        let at = |i: u32| 0.25 * f64::from(i);
+        let points: Vec<Vec3> = (0..n * n)
+            .map(|v| Vec3::new(at(v % n), at(v / n), 0.0))
+            .collect();
+        let triangles: Vec<[u32; 3]> = (0..(n - 1) * (n - 1))
+            .map(|c| c / (n - 1) * n + c % (n - 1))
+            .flat_map(|v| [[v, v + 1, v + n], [v + 1, v + n + 1, v + n]])
+            .collect();
+        let radii = vec![0.5; points.len()];
+        let c = Complex::new(points, radii, &triangles, &[]);
+        Reference::new(&c, &arcs::trace(&c), 0.1)
+    }
+
+    /// A square plate of unit quads.
+    fn plate() -> QuadMesh {
+        let n = N + 1;
+        let points: Vec<Vec3> = (0..n * n)
+            .map(|v| Vec3::new(f64::from(v % n), f64::from(v / n), 0.0))
+            .collect();
+        let quads: Vec<Option<Polygon>> = (0..N * N)
+            .map(|c| c / N * n + c % N)
+            .map(|v| Some(Polygon::quad([v, v + 1, v + n + 1, v + n], 0)))
+            .collect();
+        QuadMesh::new(&points, &vec![0.5; points.len()], &quads, &[])
+    }
+
+    const SIZING: Sizing = Sizing {
+        factor: 0.0,
+        least: 1.0,
+        most: 1.0,
+    };
+
+    fn irregular(m: &QuadMesh) -> usize {
+        (0..m.points.len())
+            .filter(|&v| m.class[v] == Class::Interior && !m.around[v].is_empty())
+            .filter(|&v| m.around[v].len() != 4)
+            .count()
+    }
+
+    #[test]
+    fn a_muddled_plate_becomes_regular_again() {
+        let (reference, mut m) = (reference(), plate());
+        let before = m.betti();
+        for i in [9, 20, 33, 36, 51] {
+            let change = rotate(&m, i, 1, i % 2 == 0).expect("a hexagon");
+            m.apply(&change);
+        }
+        assert!(irregular(&m) >= 10);
+        let annealing = Annealing {
+            reference: &reference,
+            sizing: &SIZING,
+            searches: 3,
+            seed: 1,
+        };
+        let monitor = Monitor::default();
+        let out = anneal(&m, &annealing, &monitor).expect("not cancelled");
+        let out = out.expect("a better plate");
+        assert!(irregular(&out) <= 2, "{} irregular", irregular(&out));
+        assert_eq!(out.betti(), before);
+    }
+
+    #[test]
+    fn every_change_can_be_undone() {
+        let mut m = plate();
+        let sorted = |m: &QuadMesh| {
+            let mut around = m.around.clone();
+            around.iter_mut().for_each(|a| a.sort_unstable());
+            (m.quads.clone(), around, m.points.clone())
+        };
+        let before = sorted(&m);
+        for i in 0..m.quads.len() as u32 {
+            for k in 0..4 {
+                let points = m.points.len();
+                let corner = m.quad(i).expect("a quad")[k];
+                let changes = [
+                    rotate(&m, i, k, true),
+                    collapse(&m, i, k),
+                    shorten_rim(&m, i, k),
+                    open(&mut m, corner, i, [0, 2]),
+                ];
+                for change in changes.into_iter().flatten() {
+                    let mut undo = m.apply(&change);
+                    if let Some(touched) = touched(&m, &change) {
+                        smooth_near(&mut m, &touched, &mut undo);
+                    }
+                    m.undo(undo);
+                }
+                m.truncate_points(points);
+                assert!(sorted(&m) == before, "quad {i}, corner {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn spokes_beyond_the_fan_open_nothing() {
+        // The number of quads at a vertex may exceed that of its fan: the subtraction went below zero.
+        let mut m = plate();
+        let v = N + 2;
+        for i in 0..9 {
+            for j in 0..9 {
+                let change = open(&mut m, v, 0, [i, j]);
+                assert!(change.is_none() || i.max(j) <= 4);
+            }
+        }
     }
 }

@@ -15,13 +15,13 @@ use super::polygons::Polygon;
 use super::quad_mesh::QuadMesh;
 use super::reduce::{collapse_short, prune_spurs};
 use super::reference::Reference;
-use super::square::{classes, square_up};
+use super::square::square_up;
 use super::tidy::Tidy;
 use super::walk::walk_triangles;
 use super::{QuadSkeleton, Skeleton, SkeletonError, stats, topology};
 use crate::Vec3;
 use crate::medial::MedialMesh;
-use crate::monitor::{Cancelled, Monitor};
+use crate::monitor::Monitor;
 use crate::topology::Betti;
 
 const STAGE: &str = "skeleton";
@@ -110,6 +110,7 @@ impl SkeletonOptions {
 /// 3. Coarsen to edges of about the local thickness, every vertex kept on the smoothed fine rim, seam, beam or sheet.
 /// 4. Make every sheet even, pair its triangles by maximum-weight matching, never across a seam; leftovers get a rim
 ///    vertex or meet by a triangle walk; doublets, bad diagonals and edges are cleaned up.
+/// 5. Anneal the quads toward few irregular vertices of the thickened body, rims and seams kept; square them up.
 ///
 /// The Betti numbers of `medial` are asserted after each phase. A point of `medial` that nothing uses counts as a
 /// component of its own (a ball). All faces are quads in every case; when a sheet resists, all faces are split in the
@@ -355,7 +356,11 @@ fn quads(
             searches: options.searches,
             seed: options.seed,
         };
-        polygons = improve(&mut points, &mut radii, polygons, &beams, &annealing, monitor)?;
+        let m = QuadMesh::new(&points, &radii, &polygons, &beams);
+        if let Some(better) = anneal(&m, &annealing, monitor)? {
+            polygons = better.polygons();
+            (points, radii) = (better.points, better.radii);
+        }
         square_up(&mut points, &mut radii, &polygons, &beams, reference);
         whole = !has_twins(&polygons);
     }
@@ -376,59 +381,6 @@ fn quads(
     split_lone_beams(&mut skeleton);
     drop_unused(&mut skeleton);
     Ok((skeleton, whole))
-}
-
-/// Anneals the quads, which stay as they are when their topology would change.
-fn improve(
-    points: &mut Vec<Vec3>,
-    radii: &mut Vec<f64>,
-    polygons: Vec<Option<Polygon>>,
-    beams: &[[u32; 2]],
-    annealing: &Annealing,
-    monitor: &Monitor,
-) -> Result<Vec<Option<Polygon>>, Cancelled> {
-    if annealing.searches == 0 {
-        return Ok(polygons);
-    }
-    let before = quad_mesh(points, radii, &polygons, beams);
-    let m = anneal(&before, annealing, monitor)?;
-    if m.betti() != before.betti() || m.has_twins() {
-        return Ok(polygons);
-    }
-    let out = m
-        .alive()
-        .map(|(i, q)| Some(Polygon::quad(q, m.sheet[i as usize])))
-        .collect();
-    (*points, *radii) = (m.points, m.radii);
-    Ok(out)
-}
-
-fn quad_mesh(
-    points: &[Vec3],
-    radii: &[f64],
-    polygons: &[Option<Polygon>],
-    beams: &[[u32; 2]],
-) -> QuadMesh {
-    let mut m = QuadMesh {
-        points: points.to_vec(),
-        radii: radii.to_vec(),
-        class: classes(points, polygons, beams),
-        beams: vec![Vec::new(); points.len()],
-        quads: Vec::new(),
-        sheet: Vec::new(),
-        around: vec![Vec::new(); points.len()],
-    };
-    for &[a, b] in beams {
-        m.beams[a as usize].push(b);
-        m.beams[b as usize].push(a);
-    }
-    let quads: Vec<([u32; 4], u32)> = polygons
-        .iter()
-        .flatten()
-        .filter_map(|p| p.as_quad().map(|q| (q, p.sheet)))
-        .collect();
-    m.set_quads(&quads);
-    m
 }
 
 /// Two quads over the same four points.

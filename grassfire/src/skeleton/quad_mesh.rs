@@ -2,6 +2,8 @@
 
 use super::complex::Class;
 use super::edges::betti;
+use super::polygons::Polygon;
+use super::square::classes;
 use crate::Vec3;
 use crate::topology::Betti;
 
@@ -43,6 +45,41 @@ pub(crate) struct Undo {
 }
 
 impl QuadMesh {
+    /// The quads among `polygons`.
+    pub fn new(
+        points: &[Vec3],
+        radii: &[f64],
+        polygons: &[Option<Polygon>],
+        beams: &[[u32; 2]],
+    ) -> Self {
+        let mut m = Self {
+            points: points.to_vec(),
+            radii: radii.to_vec(),
+            class: classes(points, polygons, beams),
+            beams: vec![Vec::new(); points.len()],
+            quads: Vec::new(),
+            sheet: Vec::new(),
+            around: vec![Vec::new(); points.len()],
+        };
+        for &[a, b] in beams {
+            m.beams[a as usize].push(b);
+            m.beams[b as usize].push(a);
+        }
+        for p in polygons.iter().flatten() {
+            if let Some(q) = p.as_quad() {
+                m.put(m.quads.len() as u32, q, p.sheet);
+            }
+        }
+        m
+    }
+
+    /// The quads with their sheets.
+    pub fn polygons(&self) -> Vec<Option<Polygon>> {
+        self.alive()
+            .map(|(i, q)| Some(Polygon::quad(q, self.sheet[i as usize])))
+            .collect()
+    }
+
     pub fn quad(&self, i: u32) -> Option<[u32; 4]> {
         self.quads[i as usize]
     }
@@ -164,16 +201,6 @@ impl QuadMesh {
             .filter_map(|&i| spokes(&self.quads[i as usize]?, v))
             .flatten()
             .collect()
-    }
-
-    /// Replaces all quads.
-    pub fn set_quads(&mut self, quads: &[([u32; 4], u32)]) {
-        self.around.iter_mut().for_each(Vec::clear);
-        self.quads.clear();
-        self.sheet.clear();
-        for (i, &(q, sheet)) in quads.iter().enumerate() {
-            self.put(i as u32, q, sheet);
-        }
     }
 
     /// Two quads over the same four points.

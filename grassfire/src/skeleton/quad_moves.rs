@@ -111,10 +111,7 @@ pub(crate) fn open(m: &mut QuadMesh, v: u32, start: u32, [i, j]: [usize; 2]) -> 
     if taken.len() < 2 || inside && left < 2 || n + 2 > MOST_QUADS {
         return None;
     }
-    let (s, t) = (
-        ends[i % ends.len()],
-        ends[if closed { j % n } else { j }],
-    );
+    let (s, t) = (ends[i % ends.len()], ends[if closed { j % n } else { j }]);
     let x = m.points[v as usize];
     let centre = |quads: &[u32]| -> Option<Vec3> {
         let sum = quads.iter().try_fold(Vec3::zeros(), |sum, &q| {
