@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::anneal::{Annealing, anneal};
 use super::arcs;
 use super::check::{check, check_cells, check_points};
 use super::coarsen::{Sizing, coarsen};
@@ -11,6 +12,7 @@ use super::edges::edge;
 use super::members::burn_members;
 use super::pairing::{make_even, pair, split_all, split_rims};
 use super::polygons::Polygon;
+use super::quad_mesh::QuadMesh;
 use super::reduce::{collapse_short, prune_spurs};
 use super::reference::Reference;
 use super::square::square_up;
@@ -44,6 +46,10 @@ pub struct SkeletonOptions {
     pub spur: f64,
     /// Smoothing rounds along rims, seams and beams.
     pub smoothing: usize,
+    /// Searches for quads with few irregular vertices; the best one counts, 0 leaves the quads as matched.
+    pub searches: usize,
+    /// Seed of the searches.
+    pub seed: u64,
 }
 
 impl Default for SkeletonOptions {
@@ -57,6 +63,8 @@ impl Default for SkeletonOptions {
             member_size: 4.0,
             spur: 0.6,
             smoothing: 80,
+            searches: 4,
+            seed: 1,
         }
     }
 }
@@ -81,6 +89,12 @@ impl SkeletonOptions {
         not_negative("skeleton.member_size", self.member_size)?;
         not_negative("skeleton.spur", self.spur)?;
         inside(
+            self.searches <= 1000,
+            "skeleton.searches",
+            self.searches as f64,
+            "0 to 1000",
+        )?;
+        inside(
             self.smoothing <= 1000,
             "skeleton.smoothing",
             self.smoothing as f64,
@@ -96,6 +110,7 @@ impl SkeletonOptions {
 /// 3. Coarsen to edges of about the local thickness, every vertex kept on the smoothed fine rim, seam, beam or sheet.
 /// 4. Make every sheet even, pair its triangles by maximum-weight matching, never across a seam; leftovers get a rim
 ///    vertex or meet by a triangle walk; doublets, bad diagonals and edges are cleaned up.
+/// 5. Anneal the quads toward few irregular vertices of the thickened body, rims and seams kept; square them up.
 ///
 /// The Betti numbers of `medial` are asserted after each phase. A point of `medial` that nothing uses counts as a
 /// component of its own (a ball). All faces are quads in every case; when a sheet resists, all faces are split in the
@@ -158,7 +173,7 @@ pub fn quad_skeleton(
     verify("coarsening", c.betti())?;
 
     monitor.step(STAGE, "quads", 0.8)?;
-    let (skeleton, whole) = quads(c, &reference, &sizing, monitor)?;
+    let (skeleton, whole) = quads(c, &reference, &sizing, options, monitor)?;
     if !whole {
         monitor.warn(
             STAGE,
@@ -313,6 +328,7 @@ fn quads(
     mut c: Complex,
     reference: &Reference,
     sizing: &Sizing,
+    options: &SkeletonOptions,
     monitor: &Monitor,
 ) -> Result<(Skeleton, bool), SkeletonError> {
     make_even(&mut c, reference, |c, a, b| sizing.edge(c, a, b));
@@ -334,6 +350,17 @@ fn quads(
         };
         tidy.run(monitor)?;
         (polygons, beams) = (tidy.quads, tidy.beams);
+        let annealing = Annealing {
+            reference,
+            sizing,
+            searches: options.searches,
+            seed: options.seed,
+        };
+        let m = QuadMesh::new(&points, &radii, &polygons, &beams);
+        if let Some(better) = anneal(&m, &annealing, monitor)? {
+            polygons = better.polygons();
+            (points, radii) = (better.points, better.radii);
+        }
         square_up(&mut points, &mut radii, &polygons, &beams, reference);
         whole = !has_twins(&polygons);
     }

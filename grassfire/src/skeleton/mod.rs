@@ -1,6 +1,8 @@
 //! The decomposition structure: an all-quad non-manifold skeleton with beams and one radius a point.
 
+mod anneal;
 mod arcs;
+mod body_valence;
 mod build;
 mod check;
 mod coarsen;
@@ -12,8 +14,11 @@ mod members;
 mod nearest;
 mod pairing;
 mod polygons;
+mod quad_mesh;
+mod quad_moves;
 mod reduce;
 mod reference;
+mod shape_cost;
 mod square;
 mod stats;
 mod tidy;

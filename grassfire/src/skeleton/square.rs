@@ -116,7 +116,11 @@ fn rectangle(p: [Vec3; 4]) -> [Vec3; 4] {
 }
 
 /// What may move: inside a sheet, along a smooth rim or seam, or not at all (`Corner`).
-fn classes(points: &[Vec3], polygons: &[Option<Polygon>], beams: &[[u32; 2]]) -> Vec<Class> {
+pub(crate) fn classes(
+    points: &[Vec3],
+    polygons: &[Option<Polygon>],
+    beams: &[[u32; 2]],
+) -> Vec<Class> {
     let mut rim: Vec<Vec<u32>> = vec![Vec::new(); points.len()];
     let mut seam: Vec<Vec<u32>> = vec![Vec::new(); points.len()];
     for (e, f) in edge_table(polygons).iter().filter(|(_, f)| f.len() != 2) {
