@@ -84,6 +84,62 @@ fn a_torus_of_beams() {
     assert!(fitted.body_to_iso.max < 0.3 && fitted.self_intersections.is_empty());
 }
 
+/// A plate with a wave that its few quads cannot follow.
+fn wavy_plate() -> (Skeleton, VoxelGrid<f32>) {
+    let mut b = Builder::new(3.0);
+    b.sheet(Vec3::zeros(), [x(40.0), y(30.0)], [4, 3]);
+    let wave = |p: &Vec3| {
+        let at = v(p.x.clamp(0.0, 40.0), p.y.clamp(0.0, 30.0), 0.0);
+        3.0 - (p - at - v(0.0, 0.0, 1.5 * (at.x * 0.45).sin())).norm()
+    };
+    (b.skeleton, field(v(-6.0, -6.0, -7.0), [53, 43, 15], wave))
+}
+
+fn extraordinary(fitted: &Fitted) -> usize {
+    let mut valence = vec![0; fitted.mesh.points.len()];
+    let corners = fitted.mesh.quads.iter().flatten();
+    corners.for_each(|&p| valence[p as usize] += 1);
+    valence.iter().filter(|n| **n != 4).count()
+}
+
+#[test]
+fn a_mesh_too_coarse_is_refined_without_extraordinary_points() {
+    let (skeleton, field) = wavy_plate();
+    let body = body(&skeleton);
+    let run = |refinements: u32| {
+        let options = FitOptions {
+            refinements,
+            ..FitOptions::default()
+        };
+        fit(&body, &skeleton, &field, &options, &Monitor::default()).expect("fits")
+    };
+    let (coarse, fine) = (run(0), run(3));
+    assert_eq!(coarse.body, body);
+    assert!(
+        fine.body_to_iso.rms < 0.5 * coarse.body_to_iso.rms,
+        "{fine:?}"
+    );
+    assert_eq!(extraordinary(&fine), extraordinary(&coarse));
+    let quads = [&coarse, &fine].map(|f| f.mesh.quads.len());
+    assert!(quads[1] > quads[0] && quads[1] <= 3 * quads[0]);
+    assert!(fine.self_intersections.is_empty() && fine.folds.is_empty());
+    // Edits of radii still find the skeleton point of every control point.
+    assert_eq!(fine.body.mesh.quads, fine.mesh.quads);
+    let same = [fine.body.source.len(), fine.body.foot.len()];
+    assert_eq!(same, [fine.mesh.points.len(); 2]);
+    assert!(fine.body.foot.iter().all(|p| p.z.abs() < 1e-9));
+}
+
+#[test]
+fn a_sound_body_has_the_volume_of_the_proposal() {
+    let (skeleton, field) = plate();
+    let fitted = fitted(&skeleton, &field);
+    assert!(
+        (fitted.volume / fitted.iso_volume - 1.0).abs() < 1e-3,
+        "{fitted:?}"
+    );
+}
+
 #[test]
 fn a_tangle_that_no_fit_can_cure_is_reported() {
     // Two beams that pass through each other, against a field that has both.

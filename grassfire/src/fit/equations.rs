@@ -109,22 +109,30 @@ impl Equations {
         );
     }
 
-    /// Solves the system.
-    pub fn solve(&self) -> Result<Vec<Vec3>, String> {
+    /// Factorises the matrix.
+    pub fn factor(&self) -> Result<Llt<usize, f64>, String> {
         let matrix = SparseColMatRef::new(self.pattern.as_ref(), &self.values);
-        let llt = Llt::try_new_with_symbolic(self.symbolic.clone(), matrix, Side::Lower)
-            .map_err(|e| format!("{e:?}"))?;
-        let mut x = Mat::from_fn(self.right.len(), 1, |i, _| self.right[i]);
-        llt.solve_in_place(&mut x);
-        let n = self.right.len() / 3;
-        let points: Vec<Vec3> = (0..n)
-            .map(|p| Vec3::new(x[(3 * p, 0)], x[(3 * p + 1, 0)], x[(3 * p + 2, 0)]))
-            .collect();
-        if points.iter().any(|p| p.iter().any(|x| !x.is_finite())) {
-            return Err("the solution is not finite".to_owned());
-        }
-        Ok(points)
+        Llt::try_new_with_symbolic(self.symbolic.clone(), matrix, Side::Lower)
+            .map_err(|e| format!("{e:?}"))
     }
+
+    /// Solves the system.
+    pub fn solve(&self, factor: &Llt<usize, f64>) -> Result<Vec<Vec3>, String> {
+        solve(factor, &self.right)
+    }
+}
+
+/// Solves a factorised system for one right side, three numbers a point.
+pub(super) fn solve(factor: &Llt<usize, f64>, right: &[f64]) -> Result<Vec<Vec3>, String> {
+    let mut x = Mat::from_fn(right.len(), 1, |i, _| right[i]);
+    factor.solve_in_place(&mut x);
+    let points: Vec<Vec3> = (0..right.len() / 3)
+        .map(|p| Vec3::new(x[(3 * p, 0)], x[(3 * p + 1, 0)], x[(3 * p + 2, 0)]))
+        .collect();
+    if points.iter().any(|p| p.iter().any(|x| !x.is_finite())) {
+        return Err("the solution is not finite".to_owned());
+    }
+    Ok(points)
 }
 
 /// Expands the block pattern; every column holds all three scalars of each block.
@@ -174,7 +182,8 @@ mod tests {
                 let (points, weights) = rows.row(r);
                 equations.add(points, weights, &block, &(block * target));
             }
-            let x = equations.solve().expect("positive definite");
+            let factor = equations.factor().expect("positive definite");
+            let x = equations.solve(&factor).expect("a solution");
             for (r, target) in targets.iter().enumerate() {
                 assert!((rows.apply_row(r, &x) - target).norm() < 1e-12);
             }

@@ -2,11 +2,18 @@
 
 mod clearance;
 mod equations;
+mod goal;
+mod guard;
+mod refine;
+mod residual;
 mod round;
+mod settle;
+mod strips;
 mod surface;
 mod tangles;
 mod targets;
 mod untangle;
+mod volume;
 
 pub use clearance::clear_of;
 
@@ -43,6 +50,15 @@ pub struct FitOptions {
     /// Patches whose smallest normalised Jacobian is below this count as folded; untangling aims at
     /// twice this.
     pub fold_limit: f64,
+    /// Times that strips of quads are split where the mesh is too coarse for the proposal, at most; 0 keeps the quads.
+    pub refinements: u32,
+    /// Refined meshes have at most this many times the quads.
+    pub most_quads: f64,
+    /// Refinement ends when the rms distance is below this, 95 % below twice and everything below eight times this,
+    /// voxels.
+    pub goal: f64,
+    /// Last rounds at the proposal's volume, for bodies that do not cut themselves.
+    pub settle_rounds: u32,
     /// Largest number of unfolding rounds; 0 switches untangling off.
     pub untangle_rounds: u32,
     /// Rounds that give back what untangling took, without new intersections.
@@ -62,6 +78,10 @@ impl Default for FitOptions {
             max_step: 4.0,
             evenness: 0.01,
             fold_limit: 0.05,
+            refinements: 3,
+            most_quads: 3.0,
+            goal: 0.15,
+            settle_rounds: 6,
             untangle_rounds: 12,
             regrow_rounds: 10,
             max_volume_loss: 0.01,
@@ -77,6 +97,17 @@ pub struct FitRound {
     pub mean_distance: f64,
     /// Mean move of a control point, mm.
     pub step: f64,
+}
+
+/// How one refinement went.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Refinement {
+    /// Quads afterwards.
+    pub quads: u32,
+    /// Root of the mean square distance afterwards, both ways, mm.
+    pub rms: f64,
+    /// It was kept.
+    pub accepted: bool,
 }
 
 /// How one untangling round went.
@@ -128,11 +159,17 @@ pub struct Distances {
 /// A fitted control mesh and how well it does.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Fitted {
-    /// The control mesh; same quads as the thickened body, so its `source` and `foot` still hold.
+    /// The control mesh.
     #[serde(skip)]
     pub mesh: ControlMesh,
+    /// The thickened body with the quads and points of `mesh`: the given one, its strips split as the fit needed. Its
+    /// `bodies` are those of the given one.
+    #[serde(skip)]
+    pub body: ThickenedBody,
     /// Rounds against the iso-surface.
     pub rounds: Vec<FitRound>,
+    /// Refinements in turn; none when the goal was met without.
+    pub refinements: Vec<Refinement>,
     /// Untangling rounds, also the refused ones.
     pub untangle_rounds: Vec<UntangleRound>,
     /// Intersecting triangle pairs before untangling.
@@ -226,6 +263,9 @@ impl FitError {
 ///    undone if it costs more volume or accuracy than the options allow. Places that stay are
 ///    reported in [`Fitted::self_intersections`]
 ///    and [`Fitted::folds`] and as warnings, never hidden.
+/// 4. Refinement of bodies without trouble: strips of quads are split lengthwise where the mesh is too coarse. That makes no extraordinary points,
+///    so that the number of faces does not grow with it.
+/// 5. Settling of these: a few rounds more, with little fairness and at the volume of f > 0.
 ///
 /// The normal equations are one sparse Cholesky system; its symbolic factorisation is made once.
 /// Memory and time grow nearly linearly with the quads. The result does not depend on the number of
@@ -243,28 +283,46 @@ pub fn fit(
     check_options(options)?;
     check_input(body, skeleton, field)?;
     monitor.step(STAGE, "operators", 0.0)?;
-    let surface = surface::Surface::new(body, field)?;
     let iso = targets::iso_samples(field, options.iso_samples)?;
-    let mut solver = round::Solver::new(&surface, field, &iso, options)?;
-    let mut points = surface.damped_start()?;
+    let surface = surface::Surface::new(body, field)?;
+    let thickened: Vec<Vec3> = body.mesh.points.iter().map(|p| field.to_grid(p)).collect();
+    let mut points = surface.damped_start(&thickened)?;
+    let mut solver = round::Solver::new(surface, field, &iso, options)?;
     let mut fitted = Fitted {
-        iso_volume: targets::volume(field),
+        iso_volume: volume::volume(field),
         ..Fitted::default()
     };
     for round in 0..options.rounds {
-        monitor.step(
-            STAGE,
-            "rounds",
-            0.05 + 0.6 * f64::from(round) / f64::from(options.rounds),
-        )?;
+        let part = f64::from(round) / f64::from(options.rounds);
+        monitor.step(STAGE, "rounds", 0.05 + 0.45 * part)?;
         fitted.rounds.push(solver.round(&mut points, round)?);
     }
-    untangle::untangle(&mut solver, &mut points, &mut fitted, options, monitor)?;
+    let tangles = untangle::untangle(&mut solver, &mut points, &mut fitted, options, monitor)?;
+    let body = body.clone();
+    let mut state = refine::State {
+        body,
+        solver,
+        points,
+        tangles,
+    };
+    if state.tangles.sound() {
+        state = refine::refine(state, skeleton, &mut fitted, options, monitor)?;
+        settle::settle(&mut state, &fitted, options, monitor)?;
+    }
+    let refine::State {
+        body,
+        solver,
+        points,
+        tangles,
+    } = state;
+    fitted.self_intersections = tangles.places(&solver);
+    fitted.folds = tangles.folds(&solver, options.fold_limit);
     monitor.step(STAGE, "distances", 0.97)?;
     fitted.body_to_iso = solver.body_to_iso(&points);
     fitted.iso_to_body = solver.iso_to_body(&points);
-    fitted.volume = surface.volume(&points);
-    fitted.mesh = surface.control_mesh(&points);
+    fitted.volume = solver.surface.volume(&points);
+    fitted.mesh = solver.surface.control_mesh(&points);
+    fitted.body = body;
     report(&fitted, monitor);
     Ok(fitted)
 }
@@ -311,6 +369,22 @@ fn check_options(options: &FitOptions) -> Result<(), FitError> {
     inside(
         "untangle_rounds",
         f64::from(options.untangle_rounds),
+        0.0,
+        200.0,
+        "0 to 200",
+    )?;
+    inside(
+        "refinements",
+        f64::from(options.refinements),
+        0.0,
+        20.0,
+        "0 to 20",
+    )?;
+    inside("most_quads", options.most_quads, 1.0, 100.0, "1 to 100")?;
+    inside("goal", options.goal, 0.0, 100.0, "0 to 100 voxels")?;
+    inside(
+        "settle_rounds",
+        f64::from(options.settle_rounds),
         0.0,
         200.0,
         "0 to 200",

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
-use super::equations::Equations;
+use super::equations::{Equations, solve};
 use super::surface::Surface;
 use super::targets::{IsoSamples, PointGrid, flow_to_surface};
 use super::{Distances, FitError, FitOptions, FitRound};
@@ -12,15 +12,19 @@ use crate::voxel::VoxelGrid;
 
 /// The system with the local weights that untangling changes.
 pub(super) struct Solver<'a> {
-    pub surface: &'a Surface,
-    field: &'a VoxelGrid<f32>,
-    iso: &'a IsoSamples,
-    options: FitOptions,
+    pub surface: Surface,
+    pub field: &'a VoxelGrid<f32>,
+    pub iso: &'a IsoSamples,
+    pub options: FitOptions,
     equations: Equations,
     /// Factor on the fairness of each control point.
     pub fairness: Vec<f64>,
     /// Factor on the data of each sample.
     pub trust: Vec<f64>,
+    /// The fairness that late rounds settle at.
+    pub least_fairness: f64,
+    /// Volume that every round aims at, mm3.
+    pub volume: Option<f64>,
 }
 
 /// Weights of one round.
@@ -33,7 +37,7 @@ struct Schedule {
 
 impl<'a> Solver<'a> {
     pub fn new(
-        surface: &'a Surface,
+        surface: Surface,
         field: &'a VoxelGrid<f32>,
         iso: &'a IsoSamples,
         options: &FitOptions,
@@ -41,13 +45,15 @@ impl<'a> Solver<'a> {
         let equations = Equations::new(&[&surface.samples, &surface.bending])
             .map_err(|reason| FitError::Solver { round: 0, reason })?;
         Ok(Self {
+            fairness: vec![1.0; surface.coarse.point_count],
+            trust: vec![1.0; surface.samples.rows()],
+            least_fairness: options.fairness,
+            volume: None,
             surface,
             field,
             iso,
             options: *options,
             equations,
-            fairness: vec![1.0; surface.coarse.point_count],
-            trust: vec![1.0; surface.samples.rows()],
         })
     }
 
@@ -56,7 +62,7 @@ impl<'a> Solver<'a> {
         let decay = i32::try_from(round).unwrap_or(i32::MAX);
         let schedule = Schedule {
             cap: (8.0 * 0.7f64.powi(decay)).max(2.0),
-            fairness: 0.6f64.powi(decay).max(self.options.fairness),
+            fairness: 0.6f64.powi(decay).max(self.least_fairness),
             tangential: if round > 3 { 0.03 } else { 0.1 },
         };
         let at = self.surface.samples.apply(points);
@@ -68,8 +74,7 @@ impl<'a> Solver<'a> {
         self.add_fairness(points, mean_area, schedule.fairness);
         self.add_evenness(&normals, mean_area);
         let solution = self
-            .equations
-            .solve()
+            .solution(&normals, &areas)
             .map_err(|reason| FitError::Solver { round, reason })?;
         let mut total = 0.0;
         for (p, wanted) in points.iter_mut().zip(&solution) {
@@ -83,6 +88,30 @@ impl<'a> Solver<'a> {
             mean_distance: mm * distance / area.max(1e-300),
             step: mm * total / points.len().max(1) as f64,
         })
+    }
+
+    /// The solution of the equations; with a wanted volume the one that costs least among those that have it to first
+    /// order (one Lagrange multiplier).
+    fn solution(&self, normals: &[Vec3], areas: &[f64]) -> Result<Vec<Vec3>, String> {
+        let factor = self.equations.factor()?;
+        let mut points = self.equations.solve(&factor)?;
+        let Some(wanted) = self.volume else {
+            return Ok(points);
+        };
+        let gradient = self.surface.volume_gradient(normals, areas);
+        let along = solve(&factor, &gradient)?;
+        let slope: f64 = gradient
+            .chunks_exact(3)
+            .zip(&along)
+            .map(|(g, d)| g[0] * d.x + g[1] * d.y + g[2] * d.z)
+            .sum();
+        let missing = (wanted - self.surface.volume(&points)) / self.field.spacing.powi(3);
+        if slope > 0.0 {
+            let multiplier = missing / slope;
+            let pairs = points.iter_mut().zip(&along);
+            pairs.for_each(|(p, d)| *p += multiplier * d);
+        }
+        Ok(points)
     }
 
     /// Point-to-plane rows both ways and tangential damping; returns the area-weighted distance sum.
@@ -191,6 +220,40 @@ impl<'a> Solver<'a> {
             .map(|p| (flow_to_surface(self.field, p, 12).0 - p).norm())
             .collect();
         self.summary(distances.into_iter().zip(areas).collect())
+    }
+
+    /// Signed distances of the samples to f = 0, voxels, positive where the body is too thin, and their areas. A sample
+    /// that is the nearest one to a farther place of the iso-surface has the distance to that place.
+    pub fn signed_distances(&self, points: &[Vec3]) -> (Vec<f64>, Vec<f64>) {
+        let at = self.surface.samples.apply(points);
+        let (normals, areas) = self.surface.normals_and_areas(&at);
+        let mut signed: Vec<f64> = at
+            .par_iter()
+            .zip(&normals)
+            .with_min_len(512)
+            .map(|(p, normal)| {
+                let way = flow_to_surface(self.field, p, 12).0 - p;
+                way.norm().copysign(way.dot(normal))
+            })
+            .collect();
+        let grid = PointGrid::new(&at, 1.5);
+        let nearest: Vec<Option<(u32, f64)>> = self
+            .iso
+            .points
+            .par_iter()
+            .with_min_len(512)
+            .map(|p| grid.nearest(&at, p))
+            .collect();
+        for (p, found) in self.iso.points.iter().zip(&nearest) {
+            let Some((j, _)) = *found else { continue };
+            let j = j as usize;
+            // Across the surface: samples are up to half a quarter of a quad apart.
+            let d = (p - at[j]).dot(&normals[j]);
+            if d.abs() > signed[j].abs() {
+                signed[j] = d;
+            }
+        }
+        (signed, areas)
     }
 
     /// Distances of the iso-surface samples to the limit surface.

@@ -14,7 +14,7 @@ use crate::voxel::VoxelGrid;
 /// Splits before sampling: 16 samples a quad.
 pub(super) const LEVELS: u32 = 2;
 
-/// Operators that depend on the connectivity only, and the thickened points in voxel units.
+/// Operators that depend on the connectivity only.
 pub(super) struct Surface {
     pub coarse: QuadTopology,
     /// Connectivity of the samples.
@@ -24,7 +24,6 @@ pub(super) struct Surface {
     pub laplacian: Stencils,
     /// The Laplacian of the Laplacian.
     pub bending: Stencils,
-    pub thickened: Vec<Vec3>,
     pub triangles: Vec<[u32; 3]>,
     /// Control quad of each triangle.
     pub owner: Vec<u32>,
@@ -44,7 +43,6 @@ impl Surface {
         let (triangles, owner) = triangles_of(&fine.quads, LEVELS);
         let (finest, topology) = limit_operator(n, &body.mesh.quads, LEVELS + 1)?;
         let finer = (finest, triangles_of(&topology.quads, LEVELS + 1).0);
-        let thickened = body.mesh.points.iter().map(|p| field.to_grid(p)).collect();
         let (origin, spacing) = (field.origin, field.spacing);
         Ok(Self {
             coarse,
@@ -52,7 +50,6 @@ impl Surface {
             samples,
             laplacian,
             bending,
-            thickened,
             triangles,
             owner,
             finer,
@@ -61,13 +58,12 @@ impl Surface {
         })
     }
 
-    /// Control points whose limit surface follows the thickened points T, damped towards them: least
+    /// Control points whose limit surface follows the points T, damped towards them: least
     /// squares |L X - T|^2 + 1e-2 |Lap (X - T)|^2 + 1e-6 |X|^2, L the limit positions.
-    pub fn damped_start(&self) -> Result<Vec<Vec3>, FitError> {
+    pub fn damped_start(&self, targets: &[Vec3]) -> Result<Vec<Vec3>, FitError> {
         const DAMPING: f64 = 1e-2;
         const TINY: f64 = 1e-6;
-        let targets = &self.thickened[..];
-        let n = targets.len();
+        let n = self.coarse.point_count;
         let limit = self.coarse.limit_positions();
         let bent = self.laplacian.apply(targets);
         let mut triplets: Vec<Triplet<usize, usize, f64>> =
@@ -139,6 +135,20 @@ impl Surface {
         }
         .volume();
         (fine + (fine - coarse) / 3.0) * self.spacing.powi(3)
+    }
+
+    /// How the volume changes with the control points, voxels: three numbers a point.
+    pub fn volume_gradient(&self, normals: &[Vec3], areas: &[f64]) -> Vec<f64> {
+        let mut gradient = vec![0.0; 3 * self.coarse.point_count];
+        for (j, (normal, area)) in normals.iter().zip(areas).enumerate() {
+            let (points, weights) = self.samples.row(j);
+            for (&p, &w) in points.iter().zip(weights) {
+                for a in 0..3 {
+                    gradient[3 * p as usize + a] += w * area * normal[a];
+                }
+            }
+        }
+        gradient
     }
 
     /// A position in mm.

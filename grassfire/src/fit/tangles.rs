@@ -28,7 +28,7 @@ pub(super) struct Tangles {
 
 impl Tangles {
     pub fn of(solver: &Solver, points: &[Vec3]) -> Self {
-        let surface = solver.surface;
+        let surface = &solver.surface;
         let mesh = surface.triangle_mesh(surface.samples.apply(points));
         let pairs = self_intersections(&mesh);
         let owners = pairs.iter().flatten();
@@ -61,6 +61,15 @@ impl Tangles {
         self.pairs.is_empty() && self.folded.is_empty()
     }
 
+    /// No intersections, and no patch whose normal flips over.
+    pub fn sound(&self) -> bool {
+        self.pairs.is_empty()
+            && self
+                .folded
+                .iter()
+                .all(|&q| self.jacobians[q as usize].value >= 0.0)
+    }
+
     /// One a pair, and one or more a fold, the deeper the more.
     pub fn trouble(&self) -> f64 {
         let depth = |&q: &u32| 1.0 + 10.0 * (self.aim - self.jacobians[q as usize].value);
@@ -71,6 +80,16 @@ impl Tangles {
     pub fn quads(&self) -> Vec<u32> {
         let mut quads = self.crossing.clone();
         quads.extend(&self.folded);
+        quads.sort_unstable();
+        quads.dedup();
+        quads
+    }
+
+    /// Control quads that intersect others or whose patch is below `limit`, ascending.
+    pub fn bad_quads(&self, limit: f64) -> Vec<u32> {
+        let mut quads = self.crossing.clone();
+        let below = |q: &u32| self.jacobians[*q as usize].value < limit;
+        quads.extend(self.folded.iter().copied().filter(below));
         quads.sort_unstable();
         quads.dedup();
         quads
@@ -125,7 +144,7 @@ impl Tangles {
 
     /// Groups intersecting quads that share points or intersect each other.
     pub fn places(&self, solver: &Solver) -> Vec<SelfIntersectionPlace> {
-        let surface = solver.surface;
+        let surface = &solver.surface;
         let mut parent: Vec<usize> = (0..surface.coarse.point_count).collect();
         fn root(parent: &mut [usize], mut i: usize) -> usize {
             while parent[i] != i {

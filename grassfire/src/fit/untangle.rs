@@ -1,12 +1,16 @@
 //! Removal of self-intersections and folds from the fitted limit surface, guarded.
 
+use super::guard::guarded_step;
 use super::round::Solver;
 use super::tangles::Tangles;
 use super::{FitError, FitOptions, Fitted, STAGE, UntangleRound};
 use crate::Vec3;
 use crate::monitor::Monitor;
 
-/// Step 3 of [`super::fit`].
+/// Unfolding rounds without progress before it is given up.
+const PATIENCE: u32 = 4;
+
+/// Step 3 of [`super::fit`]; returns what still intersects or folds.
 ///
 /// Offending quads are those that intersect others and those whose patch folds or nearly folds.
 /// 1. Unfold: around the offending quads fairness grows and data counts less, until there are none.
@@ -15,7 +19,6 @@ use crate::monitor::Monitor;
 ///    intersection or deepen a fold.
 /// 3. Guard: keep the result only if less trouble is left and volume and accuracy stayed within the
 ///    limits.
-/// 4. What still intersects or folds is reported.
 ///
 /// Growing again from the thickened body was tried instead of giving up after step 3: on ten parts it
 /// never left less trouble, and took three times as long.
@@ -25,7 +28,7 @@ pub(super) fn untangle(
     fitted: &mut Fitted,
     options: &FitOptions,
     monitor: &Monitor,
-) -> Result<(), FitError> {
+) -> Result<Tangles, FitError> {
     let mut left = Tangles::of(solver, points);
     fitted.pairs_before_untangling = left.pairs.len() as u32;
     fitted.folds_before_untangling = left.folds(solver, options.fold_limit).len() as u32;
@@ -47,9 +50,7 @@ pub(super) fn untangle(
             *points = trial;
         }
     }
-    fitted.self_intersections = left.places(solver);
-    fitted.folds = left.folds(solver, options.fold_limit);
-    Ok(())
+    Ok(left)
 }
 
 fn state(solver: &Solver, points: &[Vec3], tangles: &Tangles) -> UntangleRound {
@@ -72,6 +73,7 @@ fn unfold(
 ) -> Result<Tangles, FitError> {
     let mut best = (found.clone(), points.clone());
     let volume = solver.surface.volume(points);
+    let mut idle = 0;
     for round in 0..options.untangle_rounds {
         if found.none() {
             break;
@@ -79,7 +81,7 @@ fn unfold(
         monitor.step(
             STAGE,
             "untangling",
-            0.65 + 0.15 * f64::from(round) / f64::from(options.untangle_rounds),
+            0.5 + 0.15 * f64::from(round) / f64::from(options.untangle_rounds),
         )?;
         let near = found.control_points(solver, &found.quads(), 1);
         for (factor, _) in solver
@@ -107,8 +109,11 @@ fn unfold(
         fitted.untangle_rounds.push(now);
         if found.trouble() < best.0.trouble() {
             best = (found.clone(), points.clone());
+            idle = 0;
+        } else {
+            idle += 1;
         }
-        if now.volume < 0.9 * volume {
+        if now.volume < 0.9 * volume || idle == PATIENCE {
             break;
         }
     }
@@ -133,47 +138,13 @@ fn regrow(
         monitor.step(
             STAGE,
             "regrowing",
-            0.8 + 0.15 * f64::from(round) / f64::from(rounds),
+            0.65 + 0.1 * f64::from(round) / f64::from(rounds),
         )?;
         let mut wanted = points.clone();
         solver.round(&mut wanted, options.rounds + round)?;
-        let mut share = vec![1.0; points.len()];
-        let mut accepted = None;
-        let mut last = found.clone();
-        for attempt in 0..10 {
-            let trial: Vec<Vec3> = points
-                .iter()
-                .zip(&wanted)
-                .zip(&share)
-                .map(|((p, w), s)| p + *s * (w - p))
-                .collect();
-            last = Tangles::of(solver, &trial);
-            let worse = last.worse_than(&found);
-            if worse.is_empty() {
-                accepted = Some(trial);
-                break;
-            }
-            let outer = 1 + attempt / 3;
-            for (ring, factor) in [(0, 0.5), (outer, 0.7)] {
-                let near = last.control_points(solver, &worse, ring);
-                for (s, _) in share.iter_mut().zip(&near).filter(|(_, near)| **near) {
-                    *s = if attempt > 4 { 0.0 } else { *s * factor };
-                }
-            }
-            if attempt == 1 {
-                let near = last.control_points(solver, &worse, 1);
-                for (f, _) in solver
-                    .fairness
-                    .iter_mut()
-                    .zip(&near)
-                    .filter(|(_, near)| **near)
-                {
-                    *f = (*f * 2.0).min(200.0);
-                }
-            }
-        }
-        let Some(trial) = accepted else { continue };
-        let tangles = last;
+        let Some((trial, tangles)) = guarded_step(solver, points, &wanted, &found) else {
+            continue;
+        };
         *points = trial;
         found = tangles;
         let now = state(solver, points, &found);

@@ -35,9 +35,13 @@ pub(super) fn fewest(
         body.source = coarse
             .kept
             .iter()
-            .map(|i| shape.body.source[of(i)])
+            .map(|i| shape.fitted.body.source[of(i)])
             .collect();
-        body.foot = coarse.kept.iter().map(|i| shape.body.foot[of(i)]).collect();
+        body.foot = coarse
+            .kept
+            .iter()
+            .map(|i| shape.fitted.body.foot[of(i)])
+            .collect();
         let surface = patches(&coarse.mesh, &options.patches, monitor)?;
         let folds = jacobians(&surface).into_iter().enumerate();
         let folds = folds.filter(|(_, jacobian)| jacobian.value < options.fit.fold_limit);
@@ -47,12 +51,13 @@ pub(super) fn fewest(
             value: jacobian.value,
         };
         Ok::<_, StageError>(Shape {
-            body,
             fitted: Fitted {
                 mesh: coarse.mesh,
+                body: body.clone(),
                 folds: folds.map(fold).collect(),
                 ..shape.fitted
             },
+            body,
             faces_deviation: Some(coarse.deviation),
             ..shape
         })

@@ -236,11 +236,11 @@ impl Workshop<'_> {
 
 /// Whether a body with quads of `size` may be better than the best so far, which is `sound` or is none.
 ///
-/// Coarser quads may get rid of crossings, but never of distance; much finer ones the other way round. Of a design part
-/// that cuts itself in two tries the whole proposal is the better next try.
+/// Coarser quads may get rid of crossings, but never of distance; much finer ones neither, since the fit splits quads that
+/// are too coarse. Of a design part that cuts itself in two tries the whole proposal is the better next try.
 fn worth_trying(size: f64, sound: Option<bool>, design_part: bool) -> bool {
     match sound {
-        Some(true) => size <= 1.0,
+        Some(true) => (FINE..=1.0).contains(&size),
         Some(false) => size >= FINE && !(design_part && size > 1.0),
         None => true,
     }
@@ -371,9 +371,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn finer_quads_are_for_distance_and_coarser_ones_for_crossings() {
+    fn slightly_finer_quads_are_for_distance_and_coarser_ones_for_crossings() {
         assert!(worth_trying(1.0, None, false) && worth_trying(0.6, None, true));
-        assert!(worth_trying(0.6, Some(true), true) && !worth_trying(1.3, Some(true), false));
+        assert!(worth_trying(0.8, Some(true), true) && !worth_trying(1.3, Some(true), false));
+        assert!(!worth_trying(0.6, Some(true), true));
         assert!(worth_trying(1.3, Some(false), false) && !worth_trying(0.6, Some(false), false));
         assert!(worth_trying(0.8, Some(false), true) && !worth_trying(1.3, Some(false), true));
     }
