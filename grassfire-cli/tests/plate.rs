@@ -59,7 +59,8 @@ fn plate_becomes_a_good_part() {
 #[test]
 fn edits_thicken_their_place_only() {
     let folder = tempfile::tempdir().expect("a folder");
-    let half = r#"edits=[{"within":{"box":{"min":[-100,-100,-100],"max":[100,-10,100]}},"scale":1.3}]"#;
+    let half =
+        r#"edits=[{"within":{"box":{"min":[-100,-100,-100],"max":[100,-10,100]}},"scale":1.3}]"#;
     let run_with = |edits: &str| run(folder.path(), &["--recognise", "off", "--set", edits]);
     let report = run_with(half).report();
     let edits = &report["edits"];
