@@ -24,6 +24,9 @@ pub struct CadOptions {
     /// When the union has edges shorter than this, voxels, the borders of the body's faces slide out of the way and it is
     /// made again; 0 leaves them.
     pub least_edge: f64,
+    /// The body sinks this many voxels below walls of non-design bodies that it is nearly flush with, so that the two cross at
+    /// no angles near zero; 0 leaves it.
+    pub sink: f64,
     /// Rays across each non-design body in the independent volume check.
     pub rays: u32,
 }
@@ -38,6 +41,7 @@ impl Default for CadOptions {
             distance_tolerance: 1e-3,
             boolean_seconds: 300.0,
             least_edge: 0.35,
+            sink: 0.35,
             rays: 400,
         }
     }

@@ -16,6 +16,7 @@ mod untangle;
 mod volume;
 
 pub use clearance::clear_of;
+pub use volume::volume;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -59,6 +60,8 @@ pub struct FitOptions {
     pub goal: f64,
     /// Last rounds at the proposal's volume, for bodies that do not cut themselves.
     pub settle_rounds: u32,
+    /// The proposal's volume, mm3. Default: that of f > 0, whose edges are blunt.
+    pub volume: Option<f64>,
     /// Largest number of unfolding rounds; 0 switches untangling off.
     pub untangle_rounds: u32,
     /// Rounds that give back what untangling took, without new intersections.
@@ -82,6 +85,7 @@ impl Default for FitOptions {
             most_quads: 3.0,
             goal: 0.15,
             settle_rounds: 6,
+            volume: None,
             untangle_rounds: 12,
             regrow_rounds: 10,
             max_volume_loss: 0.01,
@@ -289,7 +293,7 @@ pub fn fit(
     let mut points = surface.damped_start(&thickened)?;
     let mut solver = round::Solver::new(surface, field, &iso, options)?;
     let mut fitted = Fitted {
-        iso_volume: volume::volume(field),
+        iso_volume: options.volume.unwrap_or_else(|| volume(field)),
         ..Fitted::default()
     };
     for round in 0..options.rounds {
@@ -389,6 +393,8 @@ fn check_options(options: &FitOptions) -> Result<(), FitError> {
         200.0,
         "0 to 200",
     )?;
+    let volume = options.volume.unwrap_or(1.0);
+    inside("volume", volume, 1e-9, 1e18, "a positive volume")?;
     inside("evenness", options.evenness, 0.0, 100.0, "0 to 100")?;
     inside("fold_limit", options.fold_limit, 0.0, 0.4, "0 to 0.4")?;
     inside("fairness", options.fairness, 1e-6, 1e3, "1e-6 to 1000")?;

@@ -15,38 +15,40 @@ const TETRAHEDRA: [[usize; 4]; 6] = [
     [0, 4, 6, 7],
 ];
 
-/// Volume of f > 0 of the trilinear field, mm3.
+/// Volume of f > 0, mm3.
 ///
 /// 1. Cells whose corners all have one sign are full or empty.
-/// 2. Other cells are cut into 2 x 2 x 2, each of these into six tetrahedra, in which f is taken as linear: their share
+/// 2. Other cells are cut into 2 x 2 x 2, f between the samples by cubics through four of them; trilinear values would lose
+///    1 % of a rod of eight voxels. Each part is cut into six tetrahedra, in which f is taken as linear: their share
 ///    is exact. Counting points instead would be off by up to half a point's layer on faces along the grid.
 ///
-/// Exact for planes; of a curved surface it is the trilinear field's volume, which is O(h^2) below that of a convex body.
-pub(super) fn volume(field: &VoxelGrid<f32>) -> f64 {
+/// Exact for planes. Convex edges are rounded off within a voxel: a box of 20 voxels loses 0.4 %.
+pub fn volume(field: &VoxelGrid<f32>) -> f64 {
     let [nx, ny, nz] = field.dims;
     let slices: Vec<f64> = (0..nz - 1)
         .into_par_iter()
         .map(|k| {
             let rows = (0..ny - 1).flat_map(|j| (0..nx - 1).map(move |i| [i, j, k]));
-            rows.map(|cell| cell_fraction(&corner_values(field, cell)))
-                .sum()
+            rows.map(|cell| cell_fraction(field, cell)).sum()
         })
         .collect();
     slices.iter().sum::<f64>() * field.spacing.powi(3)
 }
 
-fn cell_fraction(values: &[f64; 8]) -> f64 {
+fn cell_fraction(field: &VoxelGrid<f32>, cell: [usize; 3]) -> f64 {
+    let values = corner_values(field, cell);
     if values.iter().all(|&f| f > 0.0) {
         return 1.0;
     }
     if values.iter().all(|&f| f <= 0.0) || values.iter().any(|f| !f.is_finite()) {
         return 0.0;
     }
+    let fine = halves(field, cell);
     let mut inside = 0.0;
     for part in 0..8 {
         let corner = |c: usize| {
-            let at = |axis: usize| 0.5 * ((part >> axis & 1) + (c >> axis & 1)) as f64;
-            trilinear(values, [at(0), at(1), at(2)])
+            let at = |axis: usize| (part >> axis & 1) + (c >> axis & 1);
+            fine[at(2)][at(1)][at(0)]
         };
         let corners: [f64; 8] = std::array::from_fn(corner);
         for tetrahedron in TETRAHEDRA {
@@ -56,10 +58,22 @@ fn cell_fraction(values: &[f64; 8]) -> f64 {
     inside / 48.0
 }
 
-fn trilinear(values: &[f64; 8], [x, y, z]: [f64; 3]) -> f64 {
-    let mix = |a: f64, b: f64, t: f64| a + t * (b - a);
-    let row = |c: usize| mix(values[c], values[c + 1], x);
-    mix(mix(row(0), row(2), y), mix(row(4), row(6), y), z)
+/// Values at the corners, the middles of edges and faces and the centre of a cell, `[z][y][x]`.
+fn halves(field: &VoxelGrid<f32>, cell: [usize; 3]) -> [[[f64; 3]; 3]; 3] {
+    // The samples before, at the two ends, and after; the border repeats itself.
+    let at = |axis: usize, k: usize| (cell[axis] + k).saturating_sub(1).min(field.dims[axis] - 1);
+    let middle = |[a, b, c, d]: [f64; 4]| [b, (9.0 * (b + c) - a - d) / 16.0, c];
+    let sample = |x, y, z| f64::from(field.values[field.index(at(0, x), at(1, y), at(2, z))]);
+    let rows: [[[f64; 3]; 4]; 4] = std::array::from_fn(|z| {
+        std::array::from_fn(|y| middle(std::array::from_fn(|x| sample(x, y, z))))
+    });
+    let planes: [[[f64; 3]; 3]; 4] = rows.map(|row| {
+        let columns: [[f64; 3]; 3] =
+            std::array::from_fn(|x| middle(std::array::from_fn(|y| row[y][x])));
+        std::array::from_fn(|y| std::array::from_fn(|x| columns[x][y]))
+    });
+    let lines = |y: usize, x: usize| middle(std::array::from_fn(|z| planes[z][y][x]));
+    std::array::from_fn(|z| std::array::from_fn(|y| std::array::from_fn(|x| lines(y, x)[z])))
 }
 
 /// Share of a tetrahedron in which a linear function with these corner values is positive.
@@ -104,12 +118,22 @@ mod tests {
     #[test]
     fn faces_along_the_grid_do_not_bias_the_volume() {
         for offset in [0.0, 0.1, 0.25, 0.37, 0.5, 0.62, 0.9] {
+            for axis in 0..3 {
+                let slab = |p: &Vec3| (p[axis] - 5.0 - offset).min(15.3 - p[axis]);
+                let exact = (10.3 - offset) * 19.0 * 19.0;
+                let measured = volume(&grid(20, slab));
+                assert!(
+                    (measured / exact - 1.0).abs() < 1e-5,
+                    "{offset}: {measured} {exact}"
+                );
+            }
             let (lo, hi) = (Vec3::repeat(5.0 + offset), Vec3::new(25.3, 27.9, 21.6));
             let depth = |p: &Vec3| (p - lo).inf(&(hi - p)).min();
             let exact = (hi - lo).product();
             let measured = volume(&grid(34, depth));
+            // Its edges are blunt.
             assert!(
-                (measured / exact - 1.0).abs() < 1e-3,
+                (measured / exact - 1.0).abs() < 5e-3,
                 "{offset}: {measured} {exact}"
             );
         }

@@ -75,6 +75,7 @@ impl Site<'_> {
             part,
             united,
             wanted,
+            lost,
         }) = design
         else {
             return Ok(None);
@@ -94,14 +95,14 @@ impl Site<'_> {
             remeshed: &part,
             target: &part.field,
             united: Some(wanted),
+            lost,
         };
         let (axis, mut shape) = self.shape(&base)?;
         if !shape.sound() {
             self.give_up("its body cuts itself or folds over");
             return Ok(None);
         }
-        let surface = self.surface(&shape)?;
-        let (surface, joined) = self.joined(&mut shape, surface)?;
+        let (surface, joined) = self.joined_below(&mut shape)?;
         let voxel = remeshed.field.spacing;
         let bodies = &*self.bodies;
         let part = self.record.stage("cad", || {
@@ -173,6 +174,7 @@ impl Site<'_> {
             remeshed,
             target: &target,
             united: None,
+            lost: 0.0,
         };
         let (axis, mut shape) = self.shape(&base)?;
         let surface = self.surface(&shape)?;
@@ -180,7 +182,7 @@ impl Site<'_> {
         if shape.wrapped || intersections > 0 {
             self.bodies.drop_recognised(monitor);
         }
-        let (surface, joined) = self.joined(&mut shape, surface)?;
+        let (surface, joined, _) = self.joined(&mut shape, surface)?;
         let bodies = &mut *self.bodies;
         let part = self.record.stage("cad", || {
             union::part(
@@ -219,7 +221,7 @@ impl Site<'_> {
         Ok((axis, shape))
     }
 
-    fn surface(&mut self, shape: &Shape) -> Result<shape::Surface, PipelineError> {
+    pub(super) fn surface(&mut self, shape: &Shape) -> Result<shape::Surface, PipelineError> {
         let (options, monitor) = (self.options, self.monitor);
         let voxel = self.remeshed.field.spacing;
         let surface = self.record.stage("spline", || {

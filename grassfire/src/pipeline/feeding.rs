@@ -11,7 +11,7 @@ use crate::casting::feed::{
     feed_graph, monotony,
 };
 use crate::edit::{apply_radii, cells_of, grow};
-use crate::fit::fit;
+use crate::fit::{FitOptions, fit};
 use crate::medial::{self, MedialMesh};
 use crate::mesh::{Bvh, TriMesh, Winding};
 use crate::monitor::Monitor;
@@ -277,7 +277,11 @@ pub(super) fn fed(
     skeleton.skeleton.radii.clone_from(&fed.radii);
     skeleton.stats = skeleton::stats(&skeleton.skeleton);
     let fitted = record.stage("fit", || {
-        fit(&body, &skeleton.skeleton, &target, &options.fit, &quiet)
+        let options = FitOptions {
+            volume: Some(base.volume(&target)),
+            ..options.fit
+        };
+        fit(&body, &skeleton.skeleton, &target, &options, &quiet)
     })?;
     let added = fitted.volume - shape.fitted.volume;
     let edited = Shape {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::ReconstructOptions;
 use super::error::{PipelineError, StageError};
 use super::record::Record;
-use crate::fit::{Fitted, fit};
+use crate::fit::{FitOptions, Fitted, fit, volume};
 use crate::medial::MedialAxis;
 use crate::monitor::Monitor;
 use crate::radii;
@@ -65,6 +65,17 @@ pub(super) struct Base<'a> {
     pub(super) target: &'a VoxelGrid<f32>,
     /// The topology of the union, when non-design bodies were cut out.
     pub(super) united: Option<Betti>,
+    /// What cutting them out took that they do not give back, mm3.
+    pub(super) lost: f64,
+}
+
+impl Base<'_> {
+    /// Volume of what bodies are fitted to, mm3: that of the surface, whose edges are sharper than those of its field, what
+    /// `target` has more, and what is lost beside non-design bodies: spread over the whole surface it is a hundredth of a voxel.
+    pub(super) fn volume(&self, target: &VoxelGrid<f32>) -> f64 {
+        let more = volume(target) - volume(&self.remeshed.field);
+        self.remeshed.solid.volume() + more + self.lost
+    }
 }
 
 /// What every try starts from.
@@ -200,9 +211,14 @@ impl Workshop<'_> {
         body: ThickenedBody,
         wrapped: bool,
     ) -> Result<(Score, Shape), PipelineError> {
-        let (field, options) = (self.base.target, &self.options.fit);
+        let (base, field) = (self.base, self.base.target);
+        let options = &self.options.fit;
         let fitted = self.record.stage("fit", || {
-            fit(&body, &skeleton.skeleton, field, options, self.monitor)
+            let options = FitOptions {
+                volume: options.volume.or_else(|| Some(base.volume(field))),
+                ..*options
+            };
+            fit(&body, &skeleton.skeleton, field, &options, self.monitor)
         })?;
         let score = Score::of(&fitted, field.spacing, &self.options.report.limits);
         let shape = Shape {

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::digital::VoxelSet;
 use super::{Capsule, RemeshError, Remeshed, STAGE, closed_surface, noise};
 use crate::Vec3;
+use crate::fit::volume;
 use crate::mesh::{Bvh, TriMesh, Winding};
 use crate::monitor::Monitor;
 use crate::topology::Betti;
@@ -67,6 +68,9 @@ pub struct DesignPart {
     pub united: Betti,
     /// Topology of proposal and bodies together, bores open: what the union must have.
     pub wanted: Betti,
+    /// What proposal and bodies together have more than design part and bodies together, mm3: slices beside the bodies that were
+    /// too thin to stay.
+    pub lost: f64,
 }
 
 /// The options in mm, and how far around the bodies distances are needed.
@@ -141,8 +145,13 @@ pub fn cut_out(
     if !left.solid.contains(&true) {
         return Ok(None);
     }
-    let together = |field: &VoxelGrid<f32>| near.together(field, lengths.skin).betti();
+    let together = |field: &VoxelGrid<f32>| {
+        let united = near.together(field, lengths.skin);
+        VoxelSet::positive(united.dims, &united.values).betti()
+    };
+    let filled = |field: &VoxelGrid<f32>| volume(&near.together(field, 0.0));
     let wanted = together(&whole);
+    let wanted_volume = filled(&whole);
     let mut best = None;
     // Cleaning may close a tunnel that is needed: then less of it.
     for share in [1.0, 0.5, 0.25, 0.0] {
@@ -153,6 +162,7 @@ pub fn cut_out(
         let found = united == wanted;
         if found || best.is_none() {
             best = Some(DesignPart {
+                lost: wanted_volume - filled(&part.field),
                 part,
                 united,
                 wanted,
@@ -315,15 +325,12 @@ impl Near {
         Ok(set)
     }
 
-    /// The voxels of a field and of the bodies with their skin together, without the free lengths of the bores.
-    fn together(&self, field: &VoxelGrid<f32>, skin: f64) -> VoxelSet {
-        let mut values = field.values.clone();
-        for (n, &v) in self.voxels.iter().enumerate() {
-            let value = &mut values[v as usize];
+    /// A field and the bodies with a skin together, without the free lengths of the bores.
+    fn together(&self, field: &VoxelGrid<f32>, skin: f64) -> VoxelGrid<f32> {
+        self.replaced(field, |n, v| {
             let body = self.solid[n] + skin;
-            *value = f64::from(*value).max(body).min(-self.free[n]) as f32;
-        }
-        VoxelSet::positive(field.dims, &values)
+            f64::from(field.values[v]).max(body).min(-self.free[n])
+        })
     }
 }
 

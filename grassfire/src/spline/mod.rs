@@ -16,6 +16,7 @@ mod patches;
 mod quality;
 mod refit;
 mod removal;
+mod sink;
 mod slide;
 mod stencils;
 
@@ -30,6 +31,7 @@ pub use measure::{area, volume};
 pub use patches::{PatchOptions, patches};
 pub use quality::{G1Report, Jacobian, g1_max, jacobians};
 pub use removal::{CoarserStep, take_quads_out};
+pub use sink::sink_flush;
 pub use slide::{Crowded, slide_borders};
 pub use tessellate::{SurfaceSample, TessellateOptions, Tessellation, tessellate};
 pub mod catmull_clark;
