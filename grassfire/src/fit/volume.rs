@@ -60,19 +60,25 @@ fn cell_fraction(field: &VoxelGrid<f32>, cell: [usize; 3]) -> f64 {
 
 /// Values at the corners, the middles of edges and faces and the centre of a cell, `[z][y][x]`.
 fn halves(field: &VoxelGrid<f32>, cell: [usize; 3]) -> [[[f64; 3]; 3]; 3] {
-    // The samples before, at the two ends, and after; the border repeats itself.
+    // The samples before, at the two ends, and after; beyond the border the field goes on straight.
     let at = |axis: usize, k: usize| (cell[axis] + k).saturating_sub(1).min(field.dims[axis] - 1);
-    let middle = |[a, b, c, d]: [f64; 4]| [b, (9.0 * (b + c) - a - d) / 16.0, c];
+    let middle = |axis: usize, [a, b, c, d]: [f64; 4]| {
+        let first = cell[axis] == 0;
+        let last = cell[axis] + 2 >= field.dims[axis];
+        let a = if first { 2.0 * b - c } else { a };
+        let d = if last { 2.0 * c - b } else { d };
+        [b, (9.0 * (b + c) - a - d) / 16.0, c]
+    };
     let sample = |x, y, z| f64::from(field.values[field.index(at(0, x), at(1, y), at(2, z))]);
     let rows: [[[f64; 3]; 4]; 4] = std::array::from_fn(|z| {
-        std::array::from_fn(|y| middle(std::array::from_fn(|x| sample(x, y, z))))
+        std::array::from_fn(|y| middle(0, std::array::from_fn(|x| sample(x, y, z))))
     });
     let planes: [[[f64; 3]; 3]; 4] = rows.map(|row| {
         let columns: [[f64; 3]; 3] =
-            std::array::from_fn(|x| middle(std::array::from_fn(|y| row[y][x])));
+            std::array::from_fn(|x| middle(1, std::array::from_fn(|y| row[y][x])));
         std::array::from_fn(|y| std::array::from_fn(|x| columns[x][y]))
     });
-    let lines = |y: usize, x: usize| middle(std::array::from_fn(|z| planes[z][y][x]));
+    let lines = |y: usize, x: usize| middle(2, std::array::from_fn(|z| planes[z][y][x]));
     std::array::from_fn(|z| std::array::from_fn(|y| std::array::from_fn(|x| lines(y, x)[z])))
 }
 

@@ -11,6 +11,8 @@ const ROUNDS: usize = 3;
 /// A border that is in the way slides this many times the least edge away.
 const ROOM: f64 = 2.0;
 
+/// Edges shorter than this share of the least one are worth another union.
+const MUCH_SHORTER: f64 = 1.0 / 3.0;
 /// The body sinks below walls up to this many times the depth beside them.
 const SIDEWAYS: f64 = 3.0;
 
@@ -22,8 +24,8 @@ fn length(short: Option<&[Crowded]>) -> f64 {
 }
 
 impl Site<'_> {
-    /// [`Site::joined`] for the body sunk below walls that it is nearly flush with; where that leaves short edges also for the
-    /// body as it is, and the one whose shortest edge is longer is kept.
+    /// [`Site::joined`] for the body sunk below walls that it is nearly flush with; where that leaves very short edges also for
+    /// the body as it is, and the one whose shortest edge is longer is kept.
     pub(super) fn joined_below(
         &mut self,
         shape: &mut Shape,
@@ -43,7 +45,7 @@ impl Site<'_> {
         deeper.fitted.mesh = mesh;
         let surface = self.surface(&deeper)?;
         let (surface, joined, shortest) = self.joined(&mut deeper, surface)?;
-        if shortest.is_finite() {
+        if shortest < MUCH_SHORTER * options.cad.least_edge * self.remeshed.field.spacing {
             let plain = self.surface(shape)?;
             let plain = self.joined(shape, plain)?;
             if plain.2 > shortest {

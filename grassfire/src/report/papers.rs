@@ -269,6 +269,13 @@ pub const ALL: &[Paper] = &[
         stages: &["tetrahedra"],
         used_for: "loads on the curved faces of tetrahedra",
     },
+    Paper {
+        key: "kirkpatrick1983",
+        citation: "S. Kirkpatrick, C. D. Gelatt, M. P. Vecchi (1983): Optimization by simulated annealing. Science 220.",
+        doi: "10.1126/science.220.4598.671",
+        stages: &["skeleton"],
+        used_for: "quads of the skeleton with few irregular vertices",
+    },
 ];
 
 /// The papers behind `stages`, in the order of [`ALL`].
