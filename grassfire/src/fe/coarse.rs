@@ -1,16 +1,14 @@
 //! The coarsest level, solved directly.
 
+use faer::Mat;
 use faer::linalg::solvers::Solve;
+use faer::sparse::Triplet;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
-use faer::sparse::{SparseColMat, Triplet};
-use faer::{Mat, Side};
 
 use super::FeError;
+use super::cholesky::cholesky;
 use super::galerkin::corner;
 use super::grid::NodeGrid;
-
-/// Added to the diagonal, relative: where most of a coarse element is fixed, its matrix is singular.
-const SHIFT: f64 = 1e-9;
 
 /// A factored coarse matrix.
 pub(super) struct Coarse {
@@ -63,13 +61,8 @@ impl Coarse {
         grid: &NodeGrid,
         elements: &[([usize; 3], [[f64; 24]; 24])],
     ) -> Result<(), FeError> {
-        let failed = |what: String| FeError::Factor {
-            unknowns: self.unknowns.len(),
-            what,
-        };
         let size = self.unknowns.len();
         let mut triplets = Vec::with_capacity(elements.len() * 300 + size);
-        let mut diagonal = vec![0.0; size];
         for (at, k) in elements {
             let dofs: [usize; 24] = std::array::from_fn(|i| {
                 let [x, y, z] = corner(*at, i / 3);
@@ -77,7 +70,6 @@ impl Coarse {
                 self.numbers[node] as usize + i % 3
             });
             for i in 0..24 {
-                diagonal[dofs[i]] += k[i][i];
                 for j in 0..24 {
                     if dofs[i] >= dofs[j] {
                         triplets.push(Triplet::new(dofs[i], dofs[j], k[i][j]));
@@ -85,25 +77,11 @@ impl Coarse {
                 }
             }
         }
-        let largest = diagonal.iter().fold(0.0, |m: f64, &v| m.max(v));
-        for (i, &d) in diagonal.iter().enumerate() {
-            // A degree of freedom without stiffness stays where it is.
-            let add = if d <= 1e-14 * largest {
-                largest
-            } else {
-                SHIFT * d
-            };
-            triplets.push(Triplet::new(i, i, add));
-        }
-        let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(size, size, &triplets)
-            .map_err(|e| failed(format!("{e:?}")))?;
-        let symbolic = match &self.symbolic {
-            Some(symbolic) => symbolic.clone(),
-            None => SymbolicLlt::try_new(matrix.symbolic(), Side::Lower)
-                .map_err(|e| failed(format!("{e:?}")))?,
-        };
-        let factor = Llt::try_new_with_symbolic(symbolic.clone(), matrix.as_ref(), Side::Lower)
-            .map_err(|e| failed(format!("{e:?}")))?;
+        let (symbolic, factor) =
+            cholesky(size, triplets, self.symbolic.take()).map_err(|what| FeError::Factor {
+                unknowns: size,
+                what,
+            })?;
         self.symbolic = Some(symbolic);
         self.factor = Some(factor);
         Ok(())

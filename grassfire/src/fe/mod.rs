@@ -2,6 +2,7 @@
 //!
 //! Units: mm, N, MPa. One element a voxel of a regular grid; its modulus may be anything from 0 (not there) upwards.
 
+mod cholesky;
 mod coarse;
 mod element;
 mod energy;
@@ -23,6 +24,7 @@ mod transfer;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use cholesky::cholesky;
 pub use islands::{Component, components};
 pub use mechanism::{RIGID_MODES, free_modes, free_modes_of};
 pub use pcg::SolveStats;

@@ -1,16 +1,14 @@
 //! The linear functions on the corners, solved directly.
 
+use faer::Mat;
 use faer::linalg::solvers::Solve;
-use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
-use faer::sparse::{SparseColMat, Triplet};
-use faer::{Mat, Side};
+use faer::sparse::Triplet;
+use faer::sparse::linalg::solvers::Llt;
 
 use super::TetError;
 use super::assembly::System;
 use crate::Vec3;
-
-/// Added to the diagonal, relative: where most of the nodes around a corner are held, the matrix is singular.
-const SHIFT: f64 = 1e-9;
+use crate::fe::cholesky;
 
 /// A factored matrix of the linear functions, and the way to it and back.
 pub(super) struct Coarse {
@@ -26,7 +24,11 @@ impl Coarse {
         let parents = std::mem::take(&mut system.parents);
         let count = corners.iter().filter(|&&c| c != u32::MAX).count();
         let entries = std::mem::take(&mut system.coarse);
-        let factor = factor(3 * count, &entries)?;
+        let entries = entries.into_iter();
+        let triplets = entries.map(|(i, j, v)| Triplet::new(i as usize, j as usize, v));
+        let unknowns = 3 * count;
+        let (_, factor) = cholesky(unknowns, triplets.collect(), None)
+            .map_err(|what| TetError::Factor { unknowns, what })?;
         Ok(Self {
             factor,
             corners,
@@ -67,34 +69,4 @@ impl Coarse {
         let real = |&(corner, _): &(u32, f64)| corner != u32::MAX;
         parts.into_iter().filter(real).map(|(c, w)| (c as usize, w))
     }
-}
-
-fn factor(size: usize, entries: &[(u32, u32, f64)]) -> Result<Llt<usize, f64>, TetError> {
-    let failed = |what: String| TetError::Factor {
-        unknowns: size,
-        what,
-    };
-    let mut diagonal = vec![0.0; size];
-    let mut triplets = Vec::with_capacity(entries.len() + size);
-    for &(row, column, value) in entries {
-        if row == column {
-            diagonal[row as usize] += value;
-        }
-        triplets.push(Triplet::new(row as usize, column as usize, value));
-    }
-    let largest = diagonal.iter().fold(0.0, |m: f64, &v| m.max(v));
-    for (i, &d) in diagonal.iter().enumerate() {
-        let add = if d <= 1e-14 * largest {
-            largest
-        } else {
-            SHIFT * d
-        };
-        triplets.push(Triplet::new(i, i, add));
-    }
-    let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(size, size, &triplets)
-        .map_err(|e| failed(format!("{e:?}")))?;
-    let symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Lower)
-        .map_err(|e| failed(format!("{e:?}")))?;
-    Llt::try_new_with_symbolic(symbolic, matrix.as_ref(), Side::Lower)
-        .map_err(|e| failed(format!("{e:?}")))
 }
