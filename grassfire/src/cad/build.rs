@@ -66,10 +66,10 @@ pub(super) const IDENTITY: f64 = 1e-6;
 
 /// The fitted body's solids, with the non-design bodies put to them but nothing checked yet.
 pub struct Joined {
-    body: Body,
+    body: Built,
     bores: Vec<Vec<Bore>>,
     tools: Vec<Option<Shape>>,
-    /// None without non-design bodies, or when the body itself is not sound.
+    /// None without non-design bodies.
     union: Option<Union>,
 }
 
@@ -102,13 +102,13 @@ pub(super) fn join_with(
     monitor: &Monitor,
 ) -> Result<Joined, CadError> {
     monitor.step(STAGE, "building faces", 0.0)?;
-    let body = Body::new(brep)?;
+    let body = Built::new(brep)?;
     let bores = free_bores(bodies)?;
     let tools: Vec<Option<Shape>> = bores
         .iter()
         .map(|bores| tool(bores))
         .collect::<Result<_, _>>()?;
-    let union = if bodies.is_empty() || !body.problems.is_empty() {
+    let union = if bodies.is_empty() {
         None
     } else {
         let bosses = disjoint(bodies.iter().map(|b| &b.boss), options)?;
@@ -119,7 +119,7 @@ pub(super) fn join_with(
             tools: cutters.as_ref(),
             kernel,
         };
-        let first = booleans(&body, &inputs, options.fuzzy, false, options, monitor);
+        let first = booleans(&body.shape, &inputs, options.fuzzy, false, options, monitor);
         monitor.check()?;
         Some(Union {
             bosses,
@@ -210,10 +210,11 @@ pub(super) fn finish_with(
         tools,
         union,
     } = joined;
-    let mut messages: Vec<String> = body.problems.clone();
-    let Some(union) = union else {
+    let body = body.checked(brep)?;
+    let Some(union) = union.filter(|_| body.problems.is_empty()) else {
         return without_union(body, brep, bodies, options, monitor);
     };
+    let mut messages = Vec::new();
     let still = Expected::new(brep, bodies, &tools, options, monitor)?;
     let inputs = Inputs {
         bosses: union.bosses.as_ref(),
@@ -236,10 +237,10 @@ pub(super) fn finish_with(
         let body = match (&mut split_body, attempt.split) {
             (_, false) => &body,
             (Some(split), true) => split,
-            (none, true) => none.insert(Body::new(&split::split(
-                brep,
-                &near(brep, bodies, &tools)?,
-            ))?),
+            (none, true) => {
+                let split = split::split(brep, &near(brep, bodies, &tools)?);
+                none.insert(Built::new(&split)?.checked(&split)?)
+            }
         };
         let outcome = match first.take() {
             Some(first) => first.and_then(|made| made.checked(body, &context)),
@@ -390,6 +391,12 @@ fn badness(solid: &CadSolid) -> (usize, f64) {
     (lost, distance.fold(0.0, f64::max))
 }
 
+/// The fitted body's solids, not checked.
+struct Built {
+    shape: Shape,
+    solids: u32,
+}
+
 /// The fitted body as solids.
 pub(super) struct Body {
     pub(super) shape: Shape,
@@ -400,11 +407,19 @@ pub(super) struct Body {
     pub(super) problems: Vec<String>,
 }
 
-impl Body {
+impl Built {
     fn new(brep: &Brep) -> Result<Self, CadError> {
         patches::check(brep).map_err(|text| CadError::BadBrep { text })?;
         let solids = shells::classify(brep)?;
-        let shape = Shape::from_brep(&describe(brep, &solids))?;
+        Ok(Self {
+            shape: Shape::from_brep(&describe(brep, &solids))?,
+            solids: solids.len() as u32,
+        })
+    }
+
+    /// What the kernel, the edges' faces and the volume say of it.
+    fn checked(self, brep: &Brep) -> Result<Body, CadError> {
+        let Self { shape, solids } = self;
         let face_volumes = shape.face_volumes(VOLUME_EPS, None)?;
         let volume = face_volumes.iter().sum::<f64>();
         let mut problems = Vec::new();
@@ -425,9 +440,9 @@ impl Body {
                 brep.volume
             ));
         }
-        Ok(Self {
+        Ok(Body {
             shape,
-            solids: solids.len() as u32,
+            solids,
             volume,
             face_volumes,
             problems,

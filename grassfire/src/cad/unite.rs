@@ -143,7 +143,15 @@ impl Attempt {
             return Err(problem.clone());
         }
         let unite = |body: &Body| {
-            booleans(body, inputs, fuzzy, self.one_by_one, options, monitor)?.checked(body, context)
+            let made = booleans(
+                &body.shape,
+                inputs,
+                fuzzy,
+                self.one_by_one,
+                options,
+                monitor,
+            )?;
+            made.checked(body, context)
         };
         if !self.shift {
             return unite(body);
@@ -163,11 +171,10 @@ impl Attempt {
 
 /// Running result of the booleans.
 struct Progress<'a> {
-    body: &'a Body,
     kernel: &'a Kernel<'a>,
     shape: Shape,
     kinds: Vec<Kind>,
-    common: f64,
+    commons: Vec<Shape>,
     fuzzy: f64,
     interrupt: &'a (dyn Fn() -> bool + Sync),
 }
@@ -195,7 +202,7 @@ impl Progress<'_> {
         if let Some(common) = common
             && common.counts().map_err(|e| e.0)?.solids > 0
         {
-            self.common += self.body.volume_of(&common).map_err(|e| e.0)?;
+            self.commons.push(common);
         }
         let from = |origin: &Origin| match origin {
             Origin::Object(face) => self.kinds.get(*face as usize).copied().unwrap_or(kind),
@@ -211,14 +218,14 @@ impl Progress<'_> {
 pub(super) struct Booleans {
     pub(super) shape: Shape,
     kinds: Vec<Kind>,
-    /// Common volume with the bosses, and with the tools, mm3.
-    commons: [f64; 2],
-    /// Volume of the bosses, mm3.
-    bosses: f64,
+    /// What is common with the bosses, and with the tools.
+    commons: [Vec<Shape>; 2],
+    bosses: Option<Shape>,
 }
 
+/// Puts the bosses to the body and cuts the tools. Volumes take longer than that: [`Booleans::checked`] takes them.
 pub(super) fn booleans(
-    body: &Body,
+    body: &Shape,
     inputs: &Inputs,
     fuzzy: f64,
     one_by_one: bool,
@@ -229,18 +236,16 @@ pub(super) fn booleans(
     let start = Instant::now();
     let limit = options.boolean_seconds;
     let interrupt = move || monitor.check().is_err() || start.elapsed().as_secs_f64() > limit;
-    let faces = body.shape.counts().map_err(text)?.faces as usize;
+    let faces = body.counts().map_err(text)?.faces as usize;
     let mut at = Progress {
-        body,
         kernel: inputs.kernel,
-        shape: body.shape.share().map_err(text)?,
+        shape: body.share().map_err(text)?,
         kinds: vec![Kind::Organic; faces],
-        common: 0.0,
+        commons: Vec::new(),
         fuzzy,
         interrupt: &interrupt,
     };
-    let mut commons = [0.0; 2];
-    let mut bosses = 0.0;
+    let mut commons = [Vec::new(), Vec::new()];
     for (k, (operation, tools)) in [
         (Operation::Fuse, inputs.bosses),
         (Operation::Cut, inputs.tools),
@@ -249,10 +254,6 @@ pub(super) fn booleans(
     .enumerate()
     {
         let Some(tools) = tools else { continue };
-        if operation == Operation::Fuse {
-            bosses = tools.volume(VOLUME_EPS).map_err(text)?;
-        }
-        at.common = 0.0;
         if one_by_one {
             tools
                 .solids()
@@ -262,8 +263,9 @@ pub(super) fn booleans(
         } else {
             at.apply(operation, tools)?;
         }
-        commons[k] = at.common;
+        commons[k] = std::mem::take(&mut at.commons);
     }
+    let bosses = inputs.bosses.map(Shape::share).transpose().map_err(text)?;
     Ok(Booleans {
         shape: single(at.shape).map_err(text)?,
         kinds: at.kinds,
@@ -282,9 +284,13 @@ impl Booleans {
             commons,
             bosses,
         } = self;
+        let volume_of = |shape: &Shape| body.volume_of(shape).map_err(text);
+        let sum = |shapes: &[Shape]| shapes.iter().map(volume_of).sum::<Result<f64, String>>();
+        let commons = [sum(&commons[0])?, sum(&commons[1])?];
+        let bosses = bosses.map_or(Ok(0.0), |b| b.volume(VOLUME_EPS).map_err(text))?;
         let expected = body.volume + bosses - commons[0] - commons[1];
         gates(&shape, body.solids, context)?;
-        let volume = body.volume_of(&shape).map_err(text)?;
+        let volume = volume_of(&shape)?;
         volumes(volume, expected, commons, context)?;
         let mesh_shape = shape.translated([0.0; 3]).map_err(text)?;
         regions(&mesh_shape, &kinds, context)?;

@@ -56,6 +56,10 @@ pub fn mesh_step(
         &least,
         "-clcurv",
         "8",
+        // Short curved edges stay whole: three nodes nearly on a line make flat elements.
+        "-setnumber",
+        "Mesh.MinimumCurveNodes",
+        "2",
         // Curved elements are not turned inside out.
         "-setnumber",
         "Mesh.HighOrderOptimize",
