@@ -11,6 +11,7 @@ mod galerkin;
 mod grid;
 mod islands;
 mod kernel;
+pub(crate) mod material;
 mod matrix_free;
 mod mechanism;
 mod multigrid;
