@@ -82,6 +82,9 @@ impl WithSimd for StencilPlane<'_> {
                 continue;
             }
             self.near.load(grid, self.u, |v| v, y, z);
+            let near: [[&[f32]; 27]; 3] = std::array::from_fn(|c| {
+                std::array::from_fn(|n| self.near.row(y, n / 3 % 3, n / 9, c))
+            });
             for run in runs {
                 for block in run.at / BLOCK..(run.at + run.len).div_ceil(BLOCK) {
                     let entries = &self.values[block * STRIDE..][..STRIDE];
@@ -94,8 +97,7 @@ impl WithSimd for StencilPlane<'_> {
                         for n in 0..27 {
                             let at = first + n % 3 + half * S::F32_LANES;
                             for c in 0..3 {
-                                let u = &self.near.row(y, n / 3 % 3, n / 9, c)[at..];
-                                let v = simd.partial_load_f32s(&u[..S::F32_LANES]);
+                                let v = simd.partial_load_f32s(&near[c][n][at..at + S::F32_LANES]);
                                 for (r, sum) in sum.iter_mut().enumerate() {
                                     let k = entries[(n * 9 + r * 3 + c) * per + half];
                                     *sum = simd.mul_add_e_f32s(k, v, *sum);
