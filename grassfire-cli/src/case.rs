@@ -157,7 +157,8 @@ fn describe(case: &Case, built: &Built) -> String {
     let cell = problem.h.powi(3);
     let design = problem.count(grassfire::topopt::DESIGN);
     let frozen = problem.count(grassfire::topopt::FROZEN);
-    let memory = grassfire::fe::memory_estimate(problem.dims, problem.cases.len()) / 1e6;
+    let memory =
+        grassfire::fe::memory_estimate((design + frozen) as f64, problem.cases.len()) / 1e6;
     let mut text = format!(
         "{}\ngrid        {nx} x {ny} x {nz} voxels of {} mm, about {memory:.0} MB\nspace       {} voxels, {:.0} mm3\nnon-design  {frozen} voxels, {:.0} mm3\n",
         case.title,

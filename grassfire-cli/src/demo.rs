@@ -12,6 +12,7 @@ use crate::failure::Failure;
 use crate::{case, run};
 
 const WISHBONE: &str = include_str!("../../examples/wishbone-thick/case.toml");
+const FINE: &str = include_str!("../../examples/wishbone-fine/case.toml");
 
 /// Table 1 of Mayer, Denk and Wartzack 2023: volume mm3, largest displacement mm, strain energy J, their product kJ mm3.
 const PAPER: [(&str, [f64; 4]); 2] = [
@@ -24,7 +25,8 @@ pub fn command(args: &DemoArgs) -> Result<u8, Failure> {
     let Example::Wishbone = args.example;
     let output = args.output.clone();
     let output = output.unwrap_or_else(|| PathBuf::from("out/wishbone"));
-    let path = unpack(&output.join("input"), "case.toml", WISHBONE.as_bytes())?;
+    let text = if args.fine { FINE } else { WISHBONE };
+    let path = unpack(&output.join("input"), "case.toml", text.as_bytes())?;
     let job = RunJob {
         case: case::load(&path, &args.run)?,
         path,

@@ -104,3 +104,61 @@ fn what_cannot_be_verified_is_refused_and_nothing_is_written() {
     refused(&["run", &case, "--set", "verify.h=-1"], "verify.h");
     refused(&["run", &case, "--set", "files.chord=-1"], "files.chord");
 }
+
+#[test]
+fn bad_cases_end_with_exit_code_2_and_the_reason() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("case.toml");
+    let refused = |from: &str, to: &str, wanted: &str| {
+        assert!(PLATE.contains(from), "{from}");
+        std::fs::write(&file, PLATE.replacen(from, to, 1)).expect("writable");
+        let out = folder.path().join("out").display().to_string();
+        let output = grassfire(&["optimize", &file.display().to_string(), "-o", &out]);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{to}: {text}");
+        assert!(text.contains(wanted), "{to}: {text}");
+        assert!(!Path::new(&out).exists(), "{to}");
+    };
+    let support = "[[support]]\non = \"left\"\nfix = \"xyz\"\n";
+    refused(support, "", "support");
+    // The middle is cut out, and the load sits there.
+    let cut = "cut = [{ box = { min = [-8, -8, -2], max = [8, 8, 8] } }]\n[select]\n\
+               void = { box = { min = [-4, -4, 0], max = [4, 4, 6] } }\n";
+    let held = "on = \"right\", force = [12000, 0, 0]";
+    let loaded = PLATE.replacen("[select]\n", cut, 1);
+    std::fs::write(
+        &file,
+        loaded.replacen(held, &held.replace("right", "void"), 1),
+    )
+    .expect("writable");
+    let args = ["check", &file.display().to_string()];
+    let output = grassfire(&args);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("void"), "{text}");
+    refused("point = [20, 0, 0]", "point = [90, 0, 0]", "right");
+    refused(
+        "volume_fraction = 0.8",
+        "volume_fraction = 0",
+        "volume_fraction",
+    );
+    refused(
+        "volume_fraction = 0.8",
+        "volume_fraction = 1.2",
+        "volume_fraction",
+    );
+    let outside = "[[non_design]]\nname = \"pin\"\n\
+                   shapes = [{ box = { min = [60, 0, 0], max = [64, 4, 4] } }]\n[select]";
+    refused("[select]", outside, "pin");
+    let roof = "[[keep_out]]\nname = \"bore\"\n\
+                shapes = [{ box = { min = [-4, -4, 0], max = [4, 4, 4] } }]\n\
+                [[non_design]]\nname = \"roof\"\n\
+                shapes = [{ box = { min = [-4, -4, 4], max = [4, 4, 6] } }]\n\
+                [optimize]\ndraw = { dir = [0, 0, 1], parting = \"plane\", at = 0 }\n";
+    refused("[optimize]\n", roof, "shadow");
+    refused("[12000, 0, 0]", "[nan, 0, 0]", "force");
+    refused("h = 2.0", "h = 0.0005", "MB");
+    refused("volume_fraction", "volum_fraction", "volume_fraction");
+    refused("mm-N-MPa", "m-N-Pa", "mm-N-MPa");
+    refused("young = 70000.0", "young = 7e10", "Pa");
+}

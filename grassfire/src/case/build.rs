@@ -75,7 +75,7 @@ pub fn build(case: &Case, folder: &Path, monitor: &Monitor) -> Result<Built, Cas
             "a shape with an end",
         ));
     };
-    let (origin, dims) = grid::place(case, case.grid.h, low, high)?;
+    let (origin, dims) = grid::place(case, case.grid.h, low, high, f64::INFINITY)?;
     let mut problem = Problem {
         origin,
         h: case.grid.h,

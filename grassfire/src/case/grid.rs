@@ -5,15 +5,19 @@ use crate::Vec3;
 use crate::fe::{FeError, memory_estimate};
 use crate::topopt::{Parting, TopoptError};
 
+/// Bytes of a voxel of the grid without material: label, modulus, share.
+const PER_VOXEL: f64 = 24.0;
+
 /// A grid of voxels of edge `h` around `low` to `high` with a corner at the anchor: lower corner and voxels along x, y, z.
 ///
 /// Planes of symmetry and of parting that the anchor is not given for become faces of voxels, and the grid reaches equally
-/// far on both sides of a plane of symmetry.
+/// far on both sides of a plane of symmetry. At most the volume `filled`, mm3, holds material.
 pub(crate) fn place(
     case: &Case,
     h: f64,
     low: Vec3,
     high: Vec3,
+    filled: f64,
 ) -> Result<(Vec3, [usize; 3]), CaseError> {
     let mut anchor = case.grid.origin.map_or(low, Vec3::from);
     if let (None, Some(draw)) = (case.grid.origin, &case.optimize.draw)
@@ -47,10 +51,12 @@ pub(crate) fn place(
     }
     let limit = memory_limit(case.solver.max_memory);
     let dims = counts.map(|n| n.min(1e9) as usize);
-    let needed = memory_estimate(dims, case.case.len()) / 1e6;
+    let voxels = counts.iter().product::<f64>();
+    let filled = voxels.min(filled / h.powi(3));
+    let needed = memory_estimate(filled, case.case.len()).max(PER_VOXEL * voxels) / 1e6;
     if needed > limit || counts.iter().any(|&n| n >= 1e9) {
         return Err(CaseError::Problem(TopoptError::Fe(FeError::Memory {
-            dims,
+            voxels,
             needed,
             limit,
         })));

@@ -168,6 +168,7 @@ fn examples_are_sound() {
     for name in [
         "wishbone",
         "wishbone-free",
+        "wishbone-fine",
         "wishbone-thick",
         "cantilever",
         "mbb",

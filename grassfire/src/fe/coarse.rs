@@ -13,7 +13,7 @@ use super::grid::NodeGrid;
 /// A factored coarse matrix.
 pub(super) struct Coarse {
     /// Place in the level's fields of every unknown.
-    unknowns: Vec<u32>,
+    unknowns: Vec<usize>,
     /// Unknown of component 0 of every node `[z][y][x]`; the others follow it.
     numbers: Vec<u32>,
     symbolic: Option<SymbolicLlt<usize>>,
@@ -38,12 +38,12 @@ impl Coarse {
         let mut numbers = vec![u32::MAX; used.len()];
         for (i, _) in used.iter().enumerate().filter(|(_, used)| **used) {
             numbers[i] = unknowns.len() as u32;
-            let at = grid.node(
+            let at = [
                 i % nodes[0],
                 i / nodes[0] % nodes[1],
                 i / (nodes[0] * nodes[1]),
-            );
-            unknowns.extend((0..3).map(|c| (at + c * grid.sx) as u32));
+            ];
+            unknowns.extend((0..3).filter_map(|c| grid.node(at, c)));
         }
         let right = Mat::zeros(unknowns.len(), 1);
         Self {
@@ -91,11 +91,11 @@ impl Coarse {
     pub fn solve(&mut self, b: &[f32], x: &mut [f32]) {
         let Some(factor) = &self.factor else { return };
         for (i, &at) in self.unknowns.iter().enumerate() {
-            self.right[(i, 0)] = f64::from(b[at as usize]);
+            self.right[(i, 0)] = f64::from(b[at]);
         }
         factor.solve_in_place(&mut self.right);
         for (i, &at) in self.unknowns.iter().enumerate() {
-            x[at as usize] = self.right[(i, 0)] as f32;
+            x[at] = self.right[(i, 0)] as f32;
         }
     }
 }

@@ -1,12 +1,14 @@
 //! The trilinear hexahedron: stiffness of a unit cube.
 
+use super::material::lame;
+
 /// Stiffness matrix of a cube with edge 1 and Young's modulus 1, rows and columns `3 * corner + component`; corner `c`
 /// lies at (c & 1, c >> 1 & 1, c >> 2). For edge h and modulus E multiply by E h.
 ///
 /// 2x2x2 Gauss points, which integrate the trilinear element exactly.
 pub(super) fn stiffness(nu: f64) -> [[f64; 24]; 24] {
     let mut k = [[0.0; 24]; 24];
-    let (lambda, mu) = lame(nu);
+    let (lambda, mu) = lame(1.0, nu);
     for point in 0..8 {
         let at = gauss_point(point);
         let d = shape_gradients(at);
@@ -26,14 +28,6 @@ pub(super) fn stiffness(nu: f64) -> [[f64; 24]; 24] {
         }
     }
     k
-}
-
-/// Lame's constants for Young's modulus 1.
-pub(super) fn lame(nu: f64) -> (f64, f64) {
-    (
-        nu / ((1.0 + nu) * (1.0 - 2.0 * nu)),
-        1.0 / (2.0 * (1.0 + nu)),
-    )
 }
 
 /// Gauss point of the 2x2x2 rule in 0..=1 coordinates; all weigh 1/8.

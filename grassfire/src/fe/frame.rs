@@ -4,14 +4,12 @@ use std::collections::HashMap;
 
 use super::grid::NodeGrid;
 
-/// The finest grid, its fixed degrees of freedom, and which blocks of nodes touch stiffness.
+/// The finest grid and its fixed degrees of freedom.
 pub(super) struct Frame {
     pub grid: NodeGrid,
     /// Places in a node field, ascending.
-    pub fixed: Vec<u32>,
-    /// See [`super::matrix_free::active_blocks`].
-    pub active: Vec<bool>,
-    /// By place of the element: bit `3 corner + component` is set where fixed.
+    pub fixed: Vec<usize>,
+    /// By number of the element `[z][y][x]`: bit `3 corner + component` is set where fixed.
     masks: HashMap<usize, u32>,
     /// The elements of `masks`, ascending.
     masked: Vec<[usize; 3]>,
@@ -22,9 +20,9 @@ impl Frame {
     /// `fixed`: (node, component) pairs; doubles are allowed.
     pub fn new(grid: NodeGrid, fixed: &[([usize; 3], usize)]) -> Self {
         let n = grid.n;
-        let mut places: Vec<u32> = fixed
+        let mut places: Vec<usize> = fixed
             .iter()
-            .map(|&([x, y, z], c)| (grid.node(x, y, z) + c * grid.sx) as u32)
+            .filter_map(|&(node, c)| grid.node(node, c))
             .collect();
         places.sort_unstable();
         places.dedup();
@@ -37,7 +35,7 @@ impl Frame {
                 let (Some(x), Some(y), Some(z)) = (below(0), below(1), below(2)) else {
                     continue;
                 };
-                let mask = masks.entry(grid.element(x, y, z)).or_insert_with(|| {
+                let mask = masks.entry((z * n[1] + y) * n[0] + x).or_insert_with(|| {
                     masked.push([x, y, z]);
                     0
                 });
@@ -49,7 +47,6 @@ impl Frame {
         Self {
             grid,
             fixed: places,
-            active: Vec::new(),
             masks,
             masked,
             rows,
@@ -58,13 +55,13 @@ impl Frame {
 
     /// All elements with fixed corners, in order.
     pub fn masks(&self) -> impl Iterator<Item = ([usize; 3], u32)> + '_ {
-        self.masked
-            .iter()
-            .map(|&[x, y, z]| ([x, y, z], self.mask(self.grid.element(x, y, z))))
+        self.masked.iter().map(|&at| (at, self.mask(at)))
     }
 
     #[inline]
-    pub fn mask(&self, element: usize) -> u32 {
+    pub fn mask(&self, [x, y, z]: [usize; 3]) -> u32 {
+        let n = self.grid.n;
+        let element = (z * n[1] + y) * n[0] + x;
         self.masks.get(&element).copied().unwrap_or(0)
     }
 

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::frame::Frame;
 use super::grid::{BLOCK, NodeGrid};
 use super::matrix_free::Float;
-use super::stencil::{EMPTY, STRIDE, Stencil};
+use super::stencil::{STRIDE, Stencil};
 
 /// Length of a table: the upper triangle of 24x24, padded.
 const TABLE: usize = 304;
@@ -61,25 +61,33 @@ impl<T: Float + Mul<Output = T> + AddAssign> Tables<T> {
         }
     }
 
-    /// Adds up the matrix of a coarse element; false when it has no stiffness.
+    /// Adds up the matrix of a coarse element from the children's moduli; false when it has no stiffness.
     #[inline(always)]
-    fn element(&self, frame: &Frame, e: &[T], at: [usize; 3], sum: &mut [T; TABLE]) -> bool {
+    fn element(
+        &self,
+        frame: &Frame,
+        children: &Children<T>,
+        at: [usize; 3],
+        sum: &mut [T; TABLE],
+    ) -> bool {
         let side = 1usize << self.level;
         let mut any = false;
         let mut child = 0;
         for z in 0..side {
             for y in 0..side {
                 let (fy, fz) = (at[1] * side + y, at[2] * side + z);
-                let first = frame.grid.element(at[0] * side, fy, fz);
                 let has_masks = frame.row_has_masks(fy, fz);
-                for x in 0..side {
-                    let modulus = e[first + x];
+                for (x, &modulus) in children.row(y, z, at[0]).iter().enumerate() {
                     if modulus != T::default() {
                         if !any {
                             sum.fill(T::default());
                             any = true;
                         }
-                        let mask = if has_masks { frame.mask(first + x) } else { 0 };
+                        let mask = if has_masks {
+                            frame.mask([at[0] * side + x, fy, fz])
+                        } else {
+                            0
+                        };
                         let table = self.table(mask, child);
                         for (s, &t) in sum.iter_mut().zip(table) {
                             *s += modulus * t;
@@ -101,6 +109,46 @@ impl<T: Float + Mul<Output = T> + AddAssign> Tables<T> {
         self.special
             .get(&(mask, child as u32))
             .map_or(&self.plain[..TABLE], |t| &t[..])
+    }
+}
+
+/// The moduli under one row of coarse elements, written out in full.
+struct Children<T> {
+    side: usize,
+    width: usize,
+    values: Vec<T>,
+}
+
+impl<T: Float> Children<T> {
+    fn new(level: usize, coarse: &NodeGrid) -> Self {
+        let side = 1usize << level;
+        let width = side * coarse.n[0];
+        Self {
+            side,
+            width,
+            values: vec![T::default(); side * side * width],
+        }
+    }
+
+    /// Moves to coarse row (y, z).
+    fn load(&mut self, fine: &NodeGrid, e: &[f64], y: usize, z: usize) {
+        self.values.fill(T::default());
+        for (i, row) in self.values.chunks_exact_mut(self.width).enumerate() {
+            let (y, z) = (y * self.side + i % self.side, z * self.side + i / self.side);
+            for run in fine.row(y, z) {
+                let from = &e[fine.first(z) + run.at..][..run.len];
+                // A run of nodes may end one behind the last element.
+                for (to, &v) in row[run.x..].iter_mut().zip(from) {
+                    *to = T::of(v);
+                }
+            }
+        }
+    }
+
+    /// Children of coarse element `x` in their row (y, z).
+    #[inline(always)]
+    fn row(&self, y: usize, z: usize, x: usize) -> &[T] {
+        &self.values[(z * self.side + y) * self.width + x * self.side..][..self.side]
     }
 }
 
@@ -141,48 +189,18 @@ fn triple_product(k: &[[f64; 24]; 24], level: usize, child: usize, mask: u32) ->
     out
 }
 
-/// Numbers the stored blocks of a coarse grid: those that touch an element in which the finest grid has stiffness.
-pub(super) fn places(frame: &Frame, level: usize, grid: &NodeGrid, e: &[f32]) -> Vec<u32> {
-    let full = occupied(frame, level, grid, e);
-    let n = grid.n;
-    let mut next = 0;
-    let mut out = Vec::with_capacity((n[2] + 1) * (n[1] + 1) * grid.blocks());
-    for z in 0..=n[2] {
-        for y in 0..=n[1] {
-            for b in 0..grid.blocks() {
-                let near = |i: usize, last: usize| i.saturating_sub(1)..(i + 1).min(last);
-                let xs = (b * BLOCK).saturating_sub(1)..((b + 1) * BLOCK).min(n[0]);
-                let any = near(z, n[2]).any(|z| {
-                    near(y, n[1]).any(|y| xs.clone().any(|x| full[(z * n[1] + y) * n[0] + x]))
-                });
-                out.push(if any { next } else { EMPTY });
-                next += u32::from(any);
-            }
+/// Which elements of the next coarser grid hold stiffness; `n`: elements of the finer grid, even numbers.
+pub(super) fn coarsen(n: [usize; 3], occupied: &[bool]) -> Vec<bool> {
+    let half = n.map(|n| n / 2);
+    let mut out = vec![false; half.iter().product()];
+    for (row, finer) in occupied.chunks_exact(n[0]).enumerate() {
+        let (y, z) = (row % n[1] / 2, row / n[1] / 2);
+        let to = &mut out[(z * half[1] + y) * half[0]..][..half[0]];
+        for (to, pair) in to.iter_mut().zip(finer.chunks_exact(2)) {
+            *to |= pair[0] || pair[1];
         }
     }
     out
-}
-
-/// Which elements of a coarse grid hold stiffness.
-pub(super) fn occupied(frame: &Frame, level: usize, grid: &NodeGrid, e: &[f32]) -> Vec<bool> {
-    let n = grid.n;
-    let side = 1usize << level;
-    let plane = |z: usize| {
-        let mut out = vec![false; n[0] * n[1]];
-        for fz in z * side..(z + 1) * side {
-            for fy in 0..n[1] * side {
-                let first = frame.grid.element(0, fy, fz);
-                let row = &e[first..first + n[0] * side];
-                let flags = &mut out[fy / side * n[0]..][..n[0]];
-                for (flag, children) in flags.iter_mut().zip(row.chunks_exact(side)) {
-                    *flag |= children.iter().any(|&v| v != 0.0);
-                }
-            }
-        }
-        out
-    };
-    let planes: Vec<Vec<bool>> = (0..n[2]).into_par_iter().map(plane).collect();
-    planes.concat()
 }
 
 /// Fills the stencil of a coarse grid from the moduli `e` of the finest one.
@@ -190,31 +208,28 @@ pub(super) fn fill(
     frame: &Frame,
     grid: &NodeGrid,
     tables: &Tables<f32>,
-    e: &[f32],
+    e: &[f64],
     stencil: &mut Stencil,
 ) {
-    let flags = grid.blocks() * (grid.n[1] + 1);
     let planes = grid.n[2] + 1;
     // Each slab computes one layer of elements that its neighbour computes too.
     let slab = planes.div_ceil(4).clamp(2, 16);
+    let blocks = &stencil.blocks;
     let mut rest = &mut stencil.values[..];
     let mut slabs = Vec::new();
-    for z in (0..planes).step_by(slab) {
-        let end = (z + slab).min(planes);
-        let places = &stencil.places[z * flags..end * flags];
-        let stored = places.iter().filter(|&&p| p != EMPTY).count();
-        let (mine, others) = rest.split_at_mut(stored * STRIDE);
-        slabs.push((z, end, places, mine));
+    for first in (0..planes).step_by(slab) {
+        let end = (first + slab).min(planes);
+        let (values, others) = rest.split_at_mut((blocks[end] - blocks[first]) * STRIDE);
+        slabs.push((first, end, values));
         rest = others;
     }
-    slabs.into_par_iter().for_each(|(z, end, places, values)| {
+    slabs.into_par_iter().for_each(|(first, end, values)| {
         values.fill(0.0);
         let slab = Slab {
             grid,
-            first: z,
+            first,
             end,
-            offset: places.iter().copied().find(|&p| p != EMPTY).unwrap_or(0),
-            places,
+            blocks,
         };
         Arch::new().dispatch(|| slab.fill(frame, tables, e, values));
     });
@@ -225,20 +240,28 @@ struct Slab<'a> {
     grid: &'a NodeGrid,
     first: usize,
     end: usize,
-    places: &'a [u32],
-    offset: u32,
+    /// First block of every plane.
+    blocks: &'a [usize],
 }
 
 impl Slab<'_> {
     #[inline(always)]
-    fn fill(&self, frame: &Frame, tables: &Tables<f32>, e: &[f32], values: &mut [f32]) {
+    fn fill(&self, frame: &Frame, tables: &Tables<f32>, e: &[f64], values: &mut [f32]) {
         let n = self.grid.n;
         let mut sum = [0f32; TABLE];
+        let mut children = Children::new(tables.level, self.grid);
         for z in self.first.saturating_sub(1)..self.end.min(n[2]) {
             for y in 0..n[1] {
-                for x in 0..n[0] {
-                    if tables.element(frame, e, [x, y, z], &mut sum) {
-                        self.scatter([x, y, z], &sum, values);
+                let runs = self.grid.row(y, z);
+                if runs.is_empty() {
+                    continue;
+                }
+                children.load(&frame.grid, e, y, z);
+                for run in runs {
+                    for x in run.x..(run.x + run.len).min(n[0]) {
+                        if tables.element(frame, &children, [x, y, z], &mut sum) {
+                            self.scatter([x, y, z], &sum, values);
+                        }
                     }
                 }
             }
@@ -248,14 +271,17 @@ impl Slab<'_> {
     #[inline(always)]
     fn scatter(&self, at: [usize; 3], sum: &[f32; TABLE], values: &mut [f32]) {
         for a in 0..8 {
-            let [x, y, z] = corner(at, a);
+            let node = corner(at, a);
+            let z = node[2];
             if z < self.first || z >= self.end {
                 continue;
             }
-            let block =
-                ((z - self.first) * (self.grid.n[1] + 1) + y) * self.grid.blocks() + x / BLOCK;
-            let place = (self.places[block] - self.offset) as usize;
-            let values = &mut values[place * STRIDE + x % BLOCK..];
+            // The corners of elements with stiffness are stored.
+            let Some(place) = self.grid.place(node) else {
+                continue;
+            };
+            let block = self.blocks[z] - self.blocks[self.first] + place / BLOCK;
+            let values = &mut values[block * STRIDE + place % BLOCK..];
             for j in 0..8 {
                 let step = |d: usize| (j >> d & 1) + 1 - (a >> d & 1);
                 let neighbour = (step(2) * 3 + step(1)) * 3 + step(0);
@@ -283,16 +309,20 @@ pub(super) fn elements(
     e: &[f64],
 ) -> Vec<([usize; 3], [[f64; 24]; 24])> {
     let n = grid.n;
-    let all: Vec<Option<_>> = (0..n[0] * n[1] * n[2])
-        .into_par_iter()
-        .map(|i| {
-            let at = [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])];
-            let mut sum = [0f64; TABLE];
-            tables.element(frame, e, at, &mut sum).then(|| {
+    let row = |i: usize| {
+        let (y, z) = (i % n[1], i / n[1]);
+        let mut children = Children::new(tables.level, grid);
+        children.load(&frame.grid, e, y, z);
+        let mut out = Vec::new();
+        let mut sum = [0f64; TABLE];
+        for x in 0..n[0] {
+            if tables.element(frame, &children, [x, y, z], &mut sum) {
                 let full = std::array::from_fn(|i| std::array::from_fn(|j| sum[upper(i, j)]));
-                (at, full)
-            })
-        })
-        .collect();
-    all.into_iter().flatten().collect()
+                out.push(([x, y, z], full));
+            }
+        }
+        out
+    };
+    let rows: Vec<Vec<_>> = (0..n[1] * n[2]).into_par_iter().map(row).collect();
+    rows.concat()
 }

@@ -1,87 +1,155 @@
-//! Memory layout of fields on a structured grid of hexahedra, with a halo of zeros.
+//! Memory layout of fields on a structured grid of hexahedra: only nodes of elements that may have stiffness are stored.
 
 use rayon::prelude::*;
 
-/// Nodes in a block: rows are padded to whole blocks, so that every vector width up to 16 divides them.
+/// Nodes that are worked on together; every vector width up to 16 divides it.
 pub(super) const BLOCK: usize = 16;
+/// Runs of nodes that are nearer than this become one: a run costs more than some nodes without stiffness.
+const GAP: usize = 8;
+
+/// A run of stored nodes along x.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Run {
+    /// First node.
+    pub x: usize,
+    /// Nodes.
+    pub len: usize,
+    /// Place of the first node in its plane.
+    pub at: usize,
+}
 
 /// A grid of `n` elements along x, y, z and of one node more each way.
 ///
-/// Node fields hold `[z][y][component][x]`. A row ends with at least one unused place, a plane with one unused row, the
-/// field with one unused plane, and as much stands in front: so the neighbours of every node exist, and are zero.
-/// Element fields hold `[z][y][x]` in the same way; element (x, y, z) lies between the nodes (x, y, z) and (x+1, y+1, z+1).
+/// Rows of nodes are cut into runs, and the runs of a plane lie one behind the other. A scalar field holds the planes, a
+/// node field for every plane its three components. Element (x, y, z) lies between the nodes (x, y, z) and
+/// (x+1, y+1, z+1); a field of elements is a scalar field in which it has the place of node (x, y, z).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct NodeGrid {
     /// Elements along x, y, z.
     pub n: [usize; 3],
-    /// Places in a row of one component.
-    pub sx: usize,
-    /// Places in a row of all three components.
-    pub row: usize,
-    /// Places in a plane of nodes.
-    pub plane: usize,
-    /// Places in front of node (0, 0, 0).
-    pub front: usize,
-    /// Places of a node field.
-    pub len: usize,
+    runs: Vec<Run>,
+    /// First run of every row `[z][y]`, and their number.
+    rows: Vec<usize>,
+    /// First place of every plane in a scalar field, and the number of places.
+    planes: Vec<usize>,
 }
 
 impl NodeGrid {
-    pub fn new(n: [usize; 3]) -> Self {
-        let sx = (n[0] + 2).next_multiple_of(BLOCK);
-        let (row, sy) = (3 * sx, n[1] + 2);
-        let plane = row * sy;
-        let front = plane + row + BLOCK;
-        Self {
+    /// `occupied`: elements that may have stiffness, `[z][y][x]`.
+    pub fn new(n: [usize; 3], occupied: &[bool]) -> Self {
+        let mut out = Self {
             n,
-            sx,
-            row,
-            plane,
-            front,
-            len: front + plane * (n[2] + 1) + plane + row + BLOCK,
+            runs: Vec::new(),
+            rows: vec![0],
+            planes: vec![0],
+        };
+        let mut used = vec![false; n[0] + 1];
+        for z in 0..=n[2] {
+            let mut count = 0;
+            for y in 0..=n[1] {
+                used.fill(false);
+                for z in z.saturating_sub(1)..(z + 1).min(n[2]) {
+                    for y in y.saturating_sub(1)..(y + 1).min(n[1]) {
+                        let row = &occupied[(z * n[1] + y) * n[0]..][..n[0]];
+                        for (x, _) in row.iter().enumerate().filter(|(_, full)| **full) {
+                            used[x] = true;
+                            used[x + 1] = true;
+                        }
+                    }
+                }
+                out.cut(&used, &mut count);
+            }
+            out.planes.push(out.planes[z] + count);
         }
+        out
     }
 
-    /// Place of component 0 of a node; component `c` is `c * sx` further.
+    /// Cuts a row into runs; `count`: places of its plane so far.
+    fn cut(&mut self, used: &[bool], count: &mut usize) {
+        let first = self.runs.len();
+        for (x, _) in used.iter().enumerate().filter(|(_, used)| **used) {
+            match self.runs[first..].last_mut() {
+                Some(run) if x < run.x + run.len + GAP => {
+                    *count += x + 1 - run.x - run.len;
+                    run.len = x + 1 - run.x;
+                }
+                _ => {
+                    self.runs.push(Run {
+                        x,
+                        len: 1,
+                        at: *count,
+                    });
+                    *count += 1;
+                }
+            }
+        }
+        self.rows.push(self.runs.len());
+    }
+
+    /// The runs of a row of nodes.
     #[inline]
-    pub fn node(&self, x: usize, y: usize, z: usize) -> usize {
-        self.front + z * self.plane + y * self.row + x
+    pub fn row(&self, y: usize, z: usize) -> &[Run] {
+        let row = z * (self.n[1] + 1) + y;
+        &self.runs[self.rows[row]..self.rows[row + 1]]
     }
 
-    /// Places in a plane of elements.
-    pub fn element_plane(&self) -> usize {
-        self.sx * (self.n[1] + 2)
-    }
-
-    /// Places of an element field.
-    pub fn element_len(&self) -> usize {
-        self.element(0, 0, 0) + self.element_plane() * (self.n[2] + 2) + self.sx + BLOCK
-    }
-
-    /// Place of an element.
+    /// Stored nodes of a plane.
     #[inline]
-    pub fn element(&self, x: usize, y: usize, z: usize) -> usize {
-        let plane = self.element_plane();
-        plane + self.sx + BLOCK + z * plane + y * self.sx + x
+    pub fn count(&self, z: usize) -> usize {
+        self.planes[z + 1] - self.planes[z]
     }
 
-    /// Blocks of nodes in a row.
-    pub fn blocks(&self) -> usize {
-        self.sx / BLOCK
+    /// First place of a plane in a scalar field.
+    #[inline]
+    pub fn first(&self, z: usize) -> usize {
+        self.planes[z]
+    }
+
+    /// Places of a scalar field.
+    pub fn len(&self) -> usize {
+        self.planes[self.n[2] + 1]
+    }
+
+    /// Place of a node in its plane; none when it is not stored.
+    #[inline]
+    pub fn place(&self, [x, y, z]: [usize; 3]) -> Option<usize> {
+        let runs = self.row(y, z).iter();
+        let run = runs.rev().find(|run| run.x <= x)?;
+        (x < run.x + run.len).then_some(run.at + x - run.x)
+    }
+
+    /// Place of a component of a node in a node field.
+    #[inline]
+    pub fn node(&self, at: [usize; 3], component: usize) -> Option<usize> {
+        let z = at[2];
+        Some(3 * self.planes[z] + component * self.count(z) + self.place(at)?)
+    }
+
+    /// A scalar field of zeros.
+    pub fn scalar<T: Copy + Default>(&self) -> Vec<T> {
+        vec![T::default(); self.len()]
     }
 
     /// A node field of zeros.
     pub fn field<T: Copy + Default>(&self) -> Vec<T> {
-        vec![T::default(); self.len]
+        vec![T::default(); 3 * self.len()]
     }
 
-    /// The planes of nodes of a field, in parallel, each with its z.
+    /// The planes of a field of one or three components, in parallel, in the order of their z.
     pub fn planes<'a, T: Send>(
         &self,
+        components: usize,
         field: &'a mut [T],
     ) -> impl IndexedParallelIterator<Item = &'a mut [T]> {
-        let (front, planes) = (self.front, self.n[2] + 1);
-        field[front..front + planes * self.plane].par_chunks_mut(self.plane)
+        let mut rest = field;
+        let mut out = Vec::with_capacity(self.n[2] + 1);
+        for z in 0..=self.n[2] {
+            let (plane, others) =
+                std::mem::take(&mut rest).split_at_mut(components * self.count(z));
+            out.push(plane);
+            rest = others;
+        }
+        out.into_par_iter()
     }
 }
 

@@ -4,7 +4,9 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::grid::{BLOCK, NodeGrid};
+use super::grid::{BLOCK, NodeGrid, Run};
+use super::matrix_free::Float;
+use super::window::Window;
 
 /// One plane of `y = K u`: gathers the eight elements around every node.
 pub(super) struct Plane<'a, T> {
@@ -12,12 +14,14 @@ pub(super) struct Plane<'a, T> {
     pub z: usize,
     /// Node field.
     pub u: &'a [T],
-    /// Element field: modulus times edge.
-    pub e: &'a [T],
+    /// Field of elements: modulus times edge.
+    pub e: &'a [f64],
     /// Stiffness of the unit element, row by row.
     pub k: &'a [T; 576],
-    /// One flag a block of nodes of this plane: an element with stiffness touches it.
-    pub active: &'a [bool],
+    /// For rows of u.
+    pub near: &'a mut Window<T>,
+    /// For rows of e.
+    pub around: &'a mut Window<T>,
     /// The plane of the result.
     pub out: &'a mut [T],
 }
@@ -71,21 +75,31 @@ macro_rules! all_nodes {
 }
 
 macro_rules! plane_kernel {
-    ($float:ty, $view:ident, $view_mut:ident, $splat:ident, $mul_add:ident) => {
+    ($float:ty, $view:ident, $store:ident, $splat:ident, $mul_add:ident) => {
         impl WithSimd for Plane<'_, $float> {
             type Output = ();
 
             #[inline(always)]
             fn with_simd<S: Simd>(self, simd: S) {
-                let blocks = self.grid.blocks();
-                for y in 0..=self.grid.n[1] {
-                    let active = &self.active[y * blocks..(y + 1) * blocks];
-                    let out = &mut self.out[y * self.grid.row..(y + 1) * self.grid.row];
-                    if active.iter().any(|&a| a) {
-                        let row = Row { grid: self.grid, y, z: self.z, u: self.u, e: self.e, k: self.k, active, out };
+                let (grid, z) = (self.grid, self.z);
+                for y in 0..=grid.n[1] {
+                    let runs = grid.row(y, z);
+                    if runs.is_empty() {
+                        continue;
+                    }
+                    self.near.load(grid, self.u, |v| v, y, z);
+                    self.around.load(grid, self.e, <$float>::of, y, z);
+                    for &run in runs {
+                        let row = Row {
+                            y,
+                            run,
+                            k: self.k,
+                            near: self.near,
+                            around: self.around,
+                            count: grid.count(z),
+                            out: self.out,
+                        };
                         row.with(simd);
-                    } else {
-                        out.fill(0.0);
                     }
                 }
             }
@@ -94,31 +108,22 @@ macro_rules! plane_kernel {
         impl Row<'_, $float> {
             #[inline(always)]
             fn with<S: Simd>(self, simd: S) {
-                let grid = self.grid;
-                let (sx, k) = (grid.sx, self.k);
-                let first = grid.node(0, self.y, self.z) - grid.plane - grid.row - 1;
+                let (run, k) = (self.run, self.k);
+                let length = run.len.next_multiple_of(BLOCK);
                 let near: [[_; 27]; 3] = std::array::from_fn(|c| {
                     std::array::from_fn(|n| {
-                        let at = first + n / 9 * grid.plane + n / 3 % 3 * grid.row + n % 3 + c * sx;
-                        S::$view(&self.u[at..at + sx]).0
+                        let row = self.near.row(self.y, n / 3 % 3, n / 9, c);
+                        S::$view(&row[BLOCK + run.x - 1 + n % 3..][..length]).0
                     })
                 });
-                let corner = grid.element(0, self.y, self.z);
                 let around: [_; 8] = std::array::from_fn(|el| {
-                    let at = corner - (el & 1) - (el >> 1 & 1) * sx - (el >> 2) * grid.element_plane();
-                    S::$view(&self.e[at..at + sx]).0
+                    let row = self.around.row(self.y, 1 - (el >> 1 & 1), 1 - (el >> 2), 0);
+                    S::$view(&row[BLOCK + run.x - (el & 1)..][..length]).0
                 });
-                let out = S::$view_mut(self.out).0;
                 let vectors = around[0].len();
-                let per_block = vectors * BLOCK / sx;
+                let lanes = length / vectors;
                 let zero = simd.$splat(0.0);
-                for b in 0..vectors {
-                    if !self.active[b / per_block] {
-                        for c in 0..3 {
-                            out[c * vectors + b] = zero;
-                        }
-                        continue;
-                    }
+                for b in 0..run.len.div_ceil(lanes) {
                     let mut t = [[zero; 3]; 8];
                     all_nodes!(simd $mul_add $splat, near k t b);
                     let mut sum = [zero; 3];
@@ -128,8 +133,10 @@ macro_rules! plane_kernel {
                             sum[r] = simd.$mul_add(e, t[r], sum[r]);
                         }
                     }
+                    let (first, end) = (b * lanes, run.len.min((b + 1) * lanes));
                     for c in 0..3 {
-                        out[c * vectors + b] = sum[c];
+                        let to = c * self.count + run.at;
+                        simd.$store(&mut self.out[to + first..to + end], sum[c]);
                     }
                 }
             }
@@ -137,29 +144,29 @@ macro_rules! plane_kernel {
     };
 }
 
-/// One row of [`Plane`].
+/// One run of [`Plane`].
 struct Row<'a, T> {
-    grid: &'a NodeGrid,
     y: usize,
-    z: usize,
-    u: &'a [T],
-    e: &'a [T],
+    run: Run,
     k: &'a [T; 576],
-    active: &'a [bool],
+    near: &'a Window<T>,
+    around: &'a Window<T>,
+    /// Places of a component of the plane.
+    count: usize,
     out: &'a mut [T],
 }
 
 plane_kernel!(
     f32,
     as_simd_f32s,
-    as_mut_simd_f32s,
+    partial_store_f32s,
     splat_f32s,
     mul_add_e_f32s
 );
 plane_kernel!(
     f64,
     as_simd_f64s,
-    as_mut_simd_f64s,
+    partial_store_f64s,
     splat_f64s,
     mul_add_e_f64s
 );

@@ -11,6 +11,7 @@ mod galerkin;
 mod grid;
 mod islands;
 mod kernel;
+pub(crate) mod material;
 mod matrix_free;
 mod mechanism;
 mod multigrid;
@@ -20,6 +21,7 @@ mod solver;
 mod stencil;
 mod stress;
 mod transfer;
+mod window;
 
 #[cfg(test)]
 mod tests;
@@ -79,16 +81,22 @@ pub enum FeError {
         h: f64,
     },
     /// The estimate is above the limit.
-    #[error(
-        "the grid of {} x {} x {} voxels needs about {needed:.0} MB, the limit is {limit:.0} MB", dims[0], dims[1], dims[2]
-    )]
+    #[error("{voxels:.0} voxels need about {needed:.0} MB, the limit is {limit:.0} MB")]
     Memory {
-        /// Voxels along x, y, z.
-        dims: [usize; 3],
+        /// Voxels that may have stiffness.
+        voxels: f64,
         /// Estimate, MB.
         needed: f64,
         /// Limit, MB.
         limit: f64,
+    },
+    /// A force on a node that no material touches.
+    #[error("load case {case} pulls at node {node:?}, which touches no voxel with stiffness")]
+    LoadOnVoid {
+        /// Number of the load case, from 0.
+        case: usize,
+        /// The node.
+        node: [usize; 3],
     },
     /// The coarsest matrix could not be factored.
     #[error("the coarsest matrix ({unknowns} unknowns) cannot be factored: {what}")]
@@ -142,6 +150,7 @@ impl FeError {
                 "parts that hang on nothing slow the solver down; raise optimize.e_min to 1e-3 or solver.max_iterations"
                     .into(),
             ),
+            Self::LoadOnVoid { .. } => Some("put loads on non-design bodies".into()),
             Self::Option { .. } => Some("`grassfire schema` lists all options".into()),
             Self::Factor { .. } | Self::Cancelled(_) => None,
         }

@@ -1,16 +1,15 @@
 //! The preconditioner: one geometric multigrid cycle in single precision.
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
 use super::coarse::Coarse;
 use super::frame::Frame;
 use super::galerkin::{self, Tables};
-use super::grid::{NodeGrid, dot};
+use super::grid::{BLOCK, NodeGrid, dot};
 use super::matrix_free::{MatrixFree, hold};
 use super::smoother::{self, Diagonal, Vectors};
 use super::stencil::Stencil;
+use super::window::Window;
 use super::{FeError, SolverOptions, element, transfer};
 
 /// Power iterations for the largest eigenvalue of a coarse level: the first time, and after small changes.
@@ -21,10 +20,18 @@ const POWER_MARGIN: f64 = 1.1;
 /// Visits of the coarser levels below the second: a W cycle where it costs little.
 const VISITS: usize = 2;
 
+/// The finest grid as it is now.
+#[derive(Clone, Copy)]
+pub(super) struct Fine<'a> {
+    pub frame: &'a Frame,
+    /// Field of elements: modulus times edge.
+    pub e: &'a [f64],
+}
+
 /// The operator of a level.
 enum Operator {
     Fine(MatrixFree<f32>),
-    Coarse(Stencil),
+    Coarse(Stencil, Tables<f32>),
 }
 
 /// One level above the coarsest.
@@ -35,7 +42,6 @@ struct Level {
     coefficients: Vec<(f32, f32)>,
     /// Approximate eigenvector of the largest eigenvalue; empty on the finest level, whose elements bound it.
     probe: Vec<f32>,
-    tables: Option<Tables<f32>>,
     b: Vec<f32>,
     x: Vec<f32>,
     d: Vec<f32>,
@@ -44,7 +50,6 @@ struct Level {
 
 /// All levels.
 pub(super) struct Multigrid {
-    frame: Arc<Frame>,
     levels: Vec<Level>,
     coarsest: NodeGrid,
     tables: Tables<f64>,
@@ -57,86 +62,53 @@ pub(super) struct Multigrid {
 }
 
 impl Multigrid {
-    /// Allocates `count` levels; the finest grid divides by `2^(count - 1)`. `e` tells where there may be stiffness.
+    /// Allocates `count` levels; the finest grid divides by `2^(count - 1)`. `occupied`: its elements that may have stiffness.
     pub fn new(
-        frame: &Arc<Frame>,
+        frame: &Frame,
         nu: f64,
         count: usize,
-        e: &[f32],
+        mut occupied: Vec<bool>,
         options: &SolverOptions,
     ) -> Self {
         let stiffness = element::stiffness(nu);
-        let side = |level: usize| frame.grid.n.map(|n| n >> level);
-        let level = |l: usize| {
-            let grid = NodeGrid::new(side(l));
-            let fine = l == 0;
-            Level {
-                operator: if fine {
-                    Operator::Fine(MatrixFree::new(&grid, &stiffness))
-                } else {
-                    Operator::Coarse(Stencil::new(galerkin::places(frame, l, &grid, e)))
-                },
-                diagonal: if fine {
-                    Diagonal::Node(vec![0.0; grid.element_plane() * (grid.n[2] + 1)])
-                } else {
-                    Diagonal::Component(grid.field())
-                },
-                coefficients: Vec::new(),
-                probe: if fine { Vec::new() } else { start(&grid) },
-                tables: (!fine).then(|| Tables::new(&stiffness, l, frame)),
-                b: grid.field(),
-                x: grid.field(),
-                d: grid.field(),
-                t: grid.field(),
-                grid,
-            }
-        };
-        let last = count - 1;
-        let coarsest = NodeGrid::new(side(last));
-        let occupied = galerkin::occupied(frame, last, &coarsest, e);
+        let mut levels = Vec::new();
+        let mut grid = frame.grid.clone();
+        for l in 0..count - 1 {
+            let coarser = galerkin::coarsen(grid.n, &occupied);
+            let next = NodeGrid::new(grid.n.map(|n| n / 2), &coarser);
+            levels.push(Level::new(grid, l, &stiffness, frame));
+            (grid, occupied) = (next, coarser);
+        }
         Self {
-            frame: Arc::clone(frame),
-            levels: (0..last).map(level).collect(),
-            tables: Tables::new(&stiffness, last, frame),
-            coarse: Coarse::new(&coarsest, &occupied),
-            coarse_b: coarsest.field(),
-            coarse_x: coarsest.field(),
-            coarsest,
+            levels,
+            tables: Tables::new(&stiffness, count - 1, frame),
+            coarse: Coarse::new(&grid, &occupied),
+            coarse_b: grid.field(),
+            coarse_x: grid.field(),
+            coarsest: grid,
             unit: (stiffness[0][0], element::jacobi_bound(&stiffness)),
             options: options.clone(),
         }
     }
 
-    /// Takes new moduli (times edge), element field of the finest grid.
-    pub fn set(&mut self, e: &[f64]) -> Result<(), FeError> {
-        let elements = galerkin::elements(&self.frame, &self.coarsest, &self.tables, e);
+    /// Takes new moduli.
+    pub fn set(&mut self, Fine { frame, e }: Fine) -> Result<(), FeError> {
+        let elements = galerkin::elements(frame, &self.coarsest, &self.tables, e);
         self.coarse.factor(&self.coarsest, &elements)?;
-        let Some((first, rest)) = self.levels.split_first_mut() else {
-            return Ok(());
-        };
-        let Operator::Fine(fine) = &mut first.operator else {
-            return Ok(());
-        };
-        fine.e
-            .par_iter_mut()
-            .zip(e)
-            .for_each(|(to, &v)| *to = v as f32);
-        let e32 = &fine.e;
-        if let Diagonal::Node(inverse) = &mut first.diagonal {
-            node_diagonal(&first.grid, e32, self.unit.0, inverse);
-        }
         let options = &self.options;
-        first.coefficients =
-            smoother::coefficients(options.smoother_degree, self.unit.1, options.smoother_ratio);
-        for level in rest {
-            if let (Operator::Coarse(stencil), Some(tables)) = (&mut level.operator, &level.tables)
-            {
-                galerkin::fill(&self.frame, &level.grid, tables, e32, stencil);
-                if let Diagonal::Component(inverse) = &mut level.diagonal {
-                    component_diagonal(&level.grid, stencil, inverse);
+        for level in &mut self.levels {
+            let high = match (&mut level.operator, &mut level.diagonal) {
+                (Operator::Fine(_), Diagonal::Node(inverse)) => {
+                    node_diagonal(&level.grid, e, self.unit.0, inverse);
+                    self.unit.1
                 }
-            }
-            let high = POWER_MARGIN * level.largest_eigenvalue();
+                (Operator::Coarse(stencil, tables), Diagonal::Component(inverse)) => {
+                    galerkin::fill(frame, &level.grid, tables, e, stencil);
+                    component_diagonal(&level.grid, stencil, inverse);
+                    POWER_MARGIN * level.largest_eigenvalue()
+                }
+                _ => continue,
+            };
             level.coefficients =
                 smoother::coefficients(options.smoother_degree, high, options.smoother_ratio);
         }
@@ -144,13 +116,13 @@ impl Multigrid {
     }
 
     /// One cycle for the residual `r`; the result is [`Multigrid::result`].
-    pub fn cycle(&mut self, r: &[f64]) {
+    pub fn cycle(&mut self, fine: Fine, r: &[f64]) {
         let b = match self.levels.first_mut() {
             Some(level) => &mut level.b,
             None => &mut self.coarse_b,
         };
         b.par_iter_mut().zip(r).for_each(|(to, &v)| *to = v as f32);
-        self.solve(0);
+        self.solve(fine, 0);
     }
 
     /// The correction of the last [`Multigrid::cycle`].
@@ -158,16 +130,15 @@ impl Multigrid {
         self.levels.first().map_or(&self.coarse_x, |level| &level.x)
     }
 
-    fn solve(&mut self, l: usize) {
+    fn solve(&mut self, finest: Fine, l: usize) {
         if l == self.levels.len() {
             self.coarse.solve(&self.coarse_b, &mut self.coarse_x);
             return;
         }
-        let frame = Arc::clone(&self.frame);
         let level = &mut self.levels[l];
-        level.smooth(&frame, true);
+        level.smooth(finest, true);
         for _ in 0..if l == 0 { 1 } else { VISITS } {
-            self.levels[l].apply_x(&frame);
+            self.levels[l].apply_x(finest);
             let (above, below) = self.levels.split_at_mut(l + 1);
             let fine = &above[l];
             let (grid, b) = match below.first_mut() {
@@ -175,7 +146,7 @@ impl Multigrid {
                 None => (&self.coarsest, &mut self.coarse_b),
             };
             transfer::restrict(&fine.grid, &fine.b, &fine.t, grid, b);
-            self.solve(l + 1);
+            self.solve(finest, l + 1);
             let (above, below) = self.levels.split_at_mut(l + 1);
             let fine = &mut above[l];
             let (grid, x) = match below.first() {
@@ -184,36 +155,50 @@ impl Multigrid {
             };
             transfer::prolong(grid, x, &fine.grid, &mut fine.x);
             if l == 0 {
-                hold(&frame.fixed, &mut fine.x);
+                hold(&finest.frame.fixed, &mut fine.x);
             }
         }
-        self.levels[l].smooth(&frame, false);
+        self.levels[l].smooth(finest, false);
     }
 }
 
 impl Level {
+    fn new(grid: NodeGrid, l: usize, stiffness: &[[f64; 24]; 24], frame: &Frame) -> Self {
+        let (operator, diagonal, probe) = if l == 0 {
+            let operator = Operator::Fine(MatrixFree::new(stiffness));
+            (operator, Diagonal::Node(grid.scalar()), Vec::new())
+        } else {
+            let tables = Tables::new(stiffness, l, frame);
+            let operator = Operator::Coarse(Stencil::new(&grid), tables);
+            (operator, Diagonal::Component(grid.field()), start(&grid))
+        };
+        Self {
+            operator,
+            diagonal,
+            coefficients: Vec::new(),
+            probe,
+            b: grid.field(),
+            x: grid.field(),
+            d: grid.field(),
+            t: grid.field(),
+            grid,
+        }
+    }
+
     /// `t = K x`.
-    fn apply_x(&mut self, frame: &Frame) {
+    fn apply_x(&mut self, Fine { frame, e }: Fine) {
         match &self.operator {
-            Operator::Fine(op) => {
-                op.apply(
-                    &self.grid,
-                    &frame.active,
-                    &frame.fixed,
-                    &self.x,
-                    &mut self.t,
-                );
-            }
-            Operator::Coarse(stencil) => stencil.apply(&self.grid, &self.x, &mut self.t),
+            Operator::Fine(op) => op.apply(&self.grid, e, &frame.fixed, &self.x, &mut self.t),
+            Operator::Coarse(stencil, _) => stencil.apply(&self.grid, &self.x, &mut self.t),
         }
     }
 
     /// A Chebyshev sweep; `from_zero` when x is still to be made.
-    fn smooth(&mut self, frame: &Frame, from_zero: bool) {
+    fn smooth(&mut self, fine: Fine, from_zero: bool) {
         for i in 0..self.coefficients.len() {
             let zero = from_zero && i == 0;
             if !zero {
-                self.apply_x(frame);
+                self.apply_x(fine);
             }
             let vectors = Vectors {
                 b: &self.b,
@@ -229,15 +214,15 @@ impl Level {
                 self.coefficients[i],
             );
             if matches!(self.operator, Operator::Fine(_)) {
-                hold(&frame.fixed, &mut self.d);
-                hold(&frame.fixed, &mut self.x);
+                hold(&fine.frame.fixed, &mut self.d);
+                hold(&fine.frame.fixed, &mut self.x);
             }
         }
     }
 
     /// Largest eigenvalue of D^-1 K by power iteration from the last vector.
     fn largest_eigenvalue(&mut self) -> f64 {
-        let (Operator::Coarse(stencil), Diagonal::Component(inverse)) =
+        let (Operator::Coarse(stencil, _), Diagonal::Component(inverse)) =
             (&self.operator, &self.diagonal)
         else {
             return 0.0;
@@ -281,8 +266,9 @@ fn start(grid: &NodeGrid) -> Vec<f32> {
                     state ^= state << 13;
                     state ^= state >> 7;
                     state ^= state << 17;
-                    out[grid.node(x, y, z) + c * grid.sx] =
-                        ((state >> 11) as f64 / (1u64 << 53) as f64 - 0.5) as f32;
+                    if let Some(at) = grid.node([x, y, z], c) {
+                        out[at] = ((state >> 11) as f64 / (1u64 << 53) as f64 - 0.5) as f32;
+                    }
                 }
             }
         }
@@ -291,41 +277,45 @@ fn start(grid: &NodeGrid) -> Vec<f32> {
 }
 
 /// Inverse diagonal of the finest grid: all three entries of a node are `k` times the sum of the moduli around it.
-fn node_diagonal(grid: &NodeGrid, e: &[f32], k: f64, inverse: &mut [f32]) {
-    let plane = grid.element_plane();
-    inverse
-        .par_chunks_mut(plane)
-        .enumerate()
-        .for_each(|(z, out)| {
+fn node_diagonal(grid: &NodeGrid, e: &[f64], k: f64, inverse: &mut [f32]) {
+    let planes = grid.planes(1, inverse).enumerate();
+    planes.for_each_init(
+        || Window::new(grid, 1),
+        |around, (z, out)| {
+            around.clear();
             for y in 0..=grid.n[1] {
-                let at = grid.element(0, y, z);
-                let row = &mut out[y * grid.sx..][..=grid.n[0]];
-                for (x, inverse) in row.iter_mut().enumerate() {
-                    let sum: f64 = (0..8)
-                        .map(|i| at + x - (i & 1) - (i >> 1 & 1) * grid.sx - (i >> 2) * plane)
-                        .map(|i| f64::from(e[i]))
-                        .sum();
-                    *inverse = if sum > 0.0 {
-                        (1.0 / (k * sum)) as f32
-                    } else {
-                        0.0
-                    };
+                around.load(grid, e, |v| v as f32, y, z);
+                for run in grid.row(y, z) {
+                    for (x, inverse) in (run.x..).zip(&mut out[run.at..][..run.len]) {
+                        let sum: f64 = (0..8)
+                            .map(|i| {
+                                around.row(y, 1 - (i >> 1 & 1), 1 - (i >> 2), 0)
+                                    [BLOCK + x - (i & 1)]
+                            })
+                            .map(f64::from)
+                            .sum();
+                        *inverse = if sum > 0.0 {
+                            (1.0 / (k * sum)) as f32
+                        } else {
+                            0.0
+                        };
+                    }
                 }
             }
-        });
+        },
+    );
 }
 
 /// Inverse diagonal of a stencil.
 fn component_diagonal(grid: &NodeGrid, stencil: &Stencil, inverse: &mut [f32]) {
-    grid.planes(inverse).enumerate().for_each(|(z, out)| {
-        for y in 0..=grid.n[1] {
-            for x in 0..=grid.n[0] {
-                let entries = [0, 1, 2].map(|c| stencil.diagonal(grid, [x, y, z], c));
-                let trace: f32 = entries.iter().sum();
-                for (c, &entry) in entries.iter().enumerate() {
-                    let live = entry > 1e-12 * trace && entry > 0.0;
-                    out[y * grid.row + c * grid.sx + x] = if live { 1.0 / entry } else { 0.0 };
-                }
+    grid.planes(3, inverse).enumerate().for_each(|(z, out)| {
+        let count = grid.count(z);
+        for place in 0..count {
+            let entries = [0, 1, 2].map(|c| stencil.diagonal(z, place, c));
+            let trace: f32 = entries.iter().sum();
+            for (c, &entry) in entries.iter().enumerate() {
+                let live = entry > 1e-12 * trace && entry > 0.0;
+                out[c * count + place] = if live { 1.0 / entry } else { 0.0 };
             }
         }
     });

@@ -24,7 +24,7 @@ pub(super) fn coefficients(degree: usize, high: f64, ratio: f64) -> Vec<(f32, f3
 
 /// The inverse diagonal: one value a node where its three entries are equal, else one a degree of freedom.
 pub(super) enum Diagonal {
-    /// `[z][y][x]`, in planes of `sx * (ny + 2)`.
+    /// A scalar field.
     Node(Vec<f32>),
     /// A node field.
     Component(Vec<f32>),
@@ -47,34 +47,34 @@ pub(super) fn step(
     zero: bool,
     (c1, c2): (f32, f32),
 ) {
-    let (sx, row) = (grid.sx, grid.row);
-    grid.planes(v.x)
-        .zip(grid.planes(v.d))
+    grid.planes(3, v.x)
+        .zip(grid.planes(3, v.d))
         .enumerate()
         .for_each(|(z, (x, d))| {
-            let first = grid.node(0, 0, z);
-            for y in 0..=grid.n[1] {
-                for c in 0..3 {
-                    let at = y * row + c * sx;
-                    let (x, d) = (&mut x[at..at + sx], &mut d[at..at + sx]);
-                    let b = &v.b[first + at..][..sx];
-                    let t = &v.t[first + at..][..sx];
-                    let inverse = match diagonal {
-                        Diagonal::Node(all) => &all[z * grid.element_plane() + y * sx..][..sx],
-                        Diagonal::Component(all) => &all[first + at..][..sx],
-                    };
-                    if zero {
-                        for i in 0..sx {
-                            let new = c2 * inverse[i] * b[i];
-                            d[i] = new;
-                            x[i] = new;
-                        }
-                    } else {
-                        for i in 0..sx {
-                            let new = c1 * d[i] + c2 * inverse[i] * (b[i] - t[i]);
-                            d[i] = new;
-                            x[i] += new;
-                        }
+            let (first, count) = (grid.first(z), grid.count(z));
+            for c in 0..3 {
+                let at = 3 * first + c * count;
+                let (x, d) = (
+                    &mut x[c * count..(c + 1) * count],
+                    &mut d[c * count..(c + 1) * count],
+                );
+                let b = &v.b[at..at + count];
+                let inverse = match diagonal {
+                    Diagonal::Node(all) => &all[first..first + count],
+                    Diagonal::Component(all) => &all[at..at + count],
+                };
+                if zero {
+                    for i in 0..count {
+                        let new = c2 * inverse[i] * b[i];
+                        d[i] = new;
+                        x[i] = new;
+                    }
+                } else {
+                    let t = &v.t[at..at + count];
+                    for i in 0..count {
+                        let new = c1 * d[i] + c2 * inverse[i] * (b[i] - t[i]);
+                        d[i] = new;
+                        x[i] += new;
                     }
                 }
             }

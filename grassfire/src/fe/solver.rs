@@ -1,13 +1,11 @@
 //! The solver of one voxel model: set the moduli, solve the load cases.
 
-use std::sync::Arc;
-
-use super::energy::element_energies;
+use super::energy::add_energies;
 use super::frame::Frame;
 use super::grid::NodeGrid;
-use super::matrix_free::{MatrixFree, active_blocks};
-use super::multigrid::Multigrid;
-use super::pcg::{Pcg, SolveStats};
+use super::matrix_free::MatrixFree;
+use super::multigrid::{Fine, Multigrid};
+use super::pcg::{self, SolveStats};
 use super::{FeError, SolverOptions, element};
 use crate::monitor::Monitor;
 
@@ -29,34 +27,45 @@ pub struct VoxelModel {
 /// Most levels of a hierarchy.
 const MAX_LEVELS: usize = 7;
 
-/// Bytes that a solver takes, about: the fields of the finest grid, the stencils of the coarser ones.
-pub fn memory_estimate(dims: [usize; 3], cases: usize) -> f64 {
-    let nodes: f64 = dims.iter().map(|&n| n as f64 + 2.0).product();
-    // Single: b, x, d, t, modulus, diagonal. Double: r, p, q, modulus, u a case. Coarse levels: 1/7 of stencil and fields.
-    let fine = 4.0 * (4.0 * 3.0 + 2.0) + 8.0 * (3.0 * 3.0 + 1.0 + 3.0 * cases as f64);
-    nodes * (fine + (243.0 + 18.0) * 4.0 / 7.0)
+/// Bytes that a solver takes, about: `voxels` that may have stiffness.
+pub fn memory_estimate(voxels: f64, cases: usize) -> f64 {
+    // A node more than voxels each way, and short rows: a tenth more nodes.
+    let nodes = 1.1 * voxels + 1e4;
+    // Single: b, x, d, t, the diagonal, u of every case. Double: r, p, q, u, moduli.
+    let starts = if cases > 1 { 3.0 * cases as f64 } else { 0.0 };
+    let fine = 4.0 * (4.0 * 3.0 + 1.0 + starts) + 8.0 * (4.0 * 3.0 + 1.0);
+    // Coarse levels: 1/7 of stencil and fields, a quarter more nodes at their borders.
+    nodes * fine + voxels * 1.25 * (243.0 + 18.0) * 4.0 / 7.0
 }
 
 /// A multigrid solver for one grid; moduli may change between solutions, supports may not.
 pub struct Solver {
     model: VoxelModel,
-    frame: Arc<Frame>,
+    frame: Frame,
+    /// Field of elements: modulus times edge.
+    e: Vec<f64>,
+    operator: MatrixFree<f64>,
     multigrid: Multigrid,
-    pcg: Pcg,
-    right: Vec<Vec<(u32, f64)>>,
-    u: Vec<Vec<f64>>,
+    right: Vec<Vec<(usize, f64)>>,
+    /// Displacements of the case solved last.
+    u: Vec<f64>,
+    /// With several cases, what each starts from: rounded, which is far below the tolerance.
+    starts: Vec<Vec<f32>>,
+    last: usize,
     stiffness: [[f64; 24]; 24],
     options: SolverOptions,
 }
 
 impl Solver {
-    /// Allocates a solver. `moduli`: one a voxel, `[z][y][x]`; where it is 0 there is never any stiffness.
+    /// Allocates a solver. `moduli`: one a voxel, `[z][y][x]`; where it is 0 there is never any stiffness, nor any memory
+    /// taken.
     ///
     /// 1. The grid is padded so that it can be halved until the coarsest one has at most `options.coarsest` unknowns.
     /// 2. Galerkin tables of every level are computed; the moduli are set as by [`Solver::set_moduli`].
     ///
     /// # Errors
-    /// [`FeError::Memory`] before anything large is allocated; [`FeError::Empty`], [`FeError::Option`].
+    /// [`FeError::Memory`] before anything large is allocated; [`FeError::Empty`], [`FeError::LoadOnVoid`],
+    /// [`FeError::Option`].
     pub fn new(
         model: VoxelModel,
         moduli: &[f64],
@@ -65,29 +74,33 @@ impl Solver {
         check(&model, moduli, options)?;
         let count = levels(model.dims, options.coarsest);
         let side = 1usize << (count - 1);
-        let grid = NodeGrid::new(model.dims.map(|n| n.next_multiple_of(side)));
+        let occupied = padded(model.dims, side, moduli);
+        let grid = NodeGrid::new(model.dims.map(|n| n.next_multiple_of(side)), &occupied);
         let stiffness = element::stiffness(model.nu);
-        let mut operator = MatrixFree::<f64>::new(&grid, &stiffness);
-        let mut frame = Frame::new(grid, &model.fixed);
-        spread(&frame.grid, &model, moduli, &mut operator.e);
-        frame.active = active_blocks(&frame.grid, &operator.e);
-        let right = model.loads.iter().map(|l| sparse(&frame, l)).collect();
-        let u = model.loads.iter().map(|_| frame.grid.field()).collect();
-        let frame = Arc::new(frame);
-        let e32: Vec<f32> = operator.e.iter().map(|&v| v as f32).collect();
-        let mut multigrid = Multigrid::new(&frame, model.nu, count, &e32, options);
-        drop(e32);
-        multigrid.set(&operator.e)?;
-        Ok(Self {
-            pcg: Pcg::new(&frame, operator),
+        let frame = Frame::new(grid, &model.fixed);
+        let right = (0..model.loads.len())
+            .map(|case| sparse(&frame, &model, moduli, case))
+            .collect::<Result<Vec<_>, _>>()?;
+        let cases = right.len();
+        let mut out = Self {
+            multigrid: Multigrid::new(&frame, model.nu, count, occupied, options),
+            operator: MatrixFree::new(&stiffness),
+            e: frame.grid.scalar(),
+            u: frame.grid.field(),
+            starts: if cases > 1 {
+                vec![frame.grid.field(); cases]
+            } else {
+                Vec::new()
+            },
+            last: 0,
+            right,
             model,
             frame,
-            multigrid,
-            right,
-            u,
             stiffness,
             options: options.clone(),
-        })
+        };
+        out.set_moduli(moduli)?;
+        Ok(out)
     }
 
     /// Takes new moduli, MPa; the last displacements stay as the start of the next solution.
@@ -95,29 +108,42 @@ impl Solver {
     /// # Errors
     /// [`FeError::Factor`].
     pub fn set_moduli(&mut self, moduli: &[f64]) -> Result<(), FeError> {
-        spread(
-            &self.frame.grid,
-            &self.model,
-            moduli,
-            &mut self.pcg.operator.e,
-        );
-        self.multigrid.set(&self.pcg.operator.e)
+        spread(&self.frame.grid, &self.model, moduli, &mut self.e);
+        self.multigrid.set(Fine {
+            frame: &self.frame,
+            e: &self.e,
+        })
     }
 
-    /// Solves load case `case`.
+    /// Solves load case `case`. What is read off afterwards is of this case, until the next one is solved.
     ///
     /// # Errors
     /// [`FeError::NotConverged`]; the displacements are what was reached. [`FeError::Cancelled`].
     pub fn solve(&mut self, case: usize, monitor: &Monitor) -> Result<SolveStats, FeError> {
+        self.last = case;
+        if let Some(start) = self.starts.get(case) {
+            for (u, &start) in self.u.iter_mut().zip(start) {
+                *u = f64::from(start);
+            }
+        }
         let limits = (self.options.tolerance, self.options.max_iterations);
-        let stats = self.pcg.solve(
-            &self.frame,
+        let stats = pcg::solve(
+            Fine {
+                frame: &self.frame,
+                e: &self.e,
+            },
+            &self.operator,
             &mut self.multigrid,
             &self.right[case],
-            &mut self.u[case],
+            &mut self.u,
             limits,
             monitor,
         )?;
+        if let Some(start) = self.starts.get_mut(case) {
+            for (start, &u) in start.iter_mut().zip(&self.u) {
+                *start = u as f32;
+            }
+        }
         if stats.converged {
             return Ok(stats);
         }
@@ -131,46 +157,51 @@ impl Solver {
 
     /// Forgets the displacements of all cases.
     pub fn restart(&mut self) {
-        self.u.iter_mut().for_each(|u| u.fill(0.0));
+        self.u.fill(0.0);
+        self.starts.iter_mut().for_each(|u| u.fill(0.0));
     }
 
-    /// f'u of a load case, N mm: twice the strain energy.
-    pub fn compliance(&self, case: usize) -> f64 {
-        let u = &self.u[case];
-        self.right[case]
-            .iter()
-            .map(|&(at, f)| f * u[at as usize])
-            .sum()
+    /// f'u of the case solved last, N mm: twice the strain energy.
+    pub fn compliance(&self) -> f64 {
+        let forces = self.right[self.last].iter();
+        forces.map(|&(at, f)| f * self.u[at]).sum()
     }
 
-    /// `u_e' K0 u_e` of every voxel for modulus 1 and edge h, `[z][y][x]`, mm3.
-    pub fn energies(&self, case: usize) -> Vec<f64> {
-        let mut out = element_energies(
-            &self.frame.grid,
-            self.model.dims,
-            &self.stiffness,
-            &self.u[case],
-        );
-        out.iter_mut().for_each(|v| *v *= self.model.h);
-        out
+    /// Adds `factor u_e' K0 u_e` of the case solved last to every voxel of `out`, for modulus 1 and edge h, `[z][y][x]`,
+    /// mm3.
+    pub fn add_energies(&self, factor: f64, out: &mut [f64]) {
+        let factor = factor * self.model.h;
+        let (grid, dims) = (&self.frame.grid, self.model.dims);
+        add_energies(grid, dims, &self.stiffness, &self.u, factor, out);
     }
 
-    /// Displacement of a node, mm.
-    pub fn displacement(&self, case: usize, [x, y, z]: [usize; 3]) -> [f64; 3] {
-        let at = self.frame.grid.node(x, y, z);
-        [0, 1, 2].map(|c| self.u[case][at + c * self.frame.grid.sx])
+    /// Displacement of a node in the case solved last, mm; zero where there is no material.
+    pub fn displacement(&self, node: [usize; 3]) -> [f64; 3] {
+        let u = |c| self.frame.grid.node(node, c).map_or(0.0, |at| self.u[at]);
+        [0, 1, 2].map(u)
     }
 
-    /// Sum of the reactions at the supports, N.
-    pub fn reactions(&mut self, case: usize) -> [f64; 3] {
+    /// Sum of the reactions at the supports in the case solved last, N.
+    pub fn reactions(&self) -> [f64; 3] {
         let grid = &self.frame.grid;
-        let product = self.pcg.product(&self.frame, &self.u[case]);
+        let mut product = grid.field();
+        self.operator
+            .apply(grid, &self.e, &[], &self.u, &mut product);
         let mut sum = [0.0; 3];
-        for &at in &self.frame.fixed {
-            let c = (at as usize - grid.front) % grid.row / grid.sx;
-            sum[c] += product[at as usize];
+        let mut fixed = self.model.fixed.clone();
+        fixed.sort_unstable();
+        fixed.dedup();
+        for (node, c) in fixed {
+            if let Some(at) = grid.node(node, c) {
+                sum[c] += product[at];
+            }
         }
         sum
+    }
+
+    /// Nodes in memory: those of voxels that may have stiffness, and some in short gaps between them.
+    pub fn stored_nodes(&self) -> usize {
+        self.frame.grid.len()
     }
 
     /// What the solver was made for.
@@ -200,17 +231,18 @@ fn check(model: &VoxelModel, moduli: &[f64], options: &SolverOptions) -> Result<
         return bad("coarsest", options.coarsest as f64, "100 or more");
     }
     let dims = model.dims;
-    let needed = memory_estimate(dims, model.loads.len()) / 1e6;
-    // Places are counted in 32 bits.
-    if needed > options.max_memory || dims.iter().map(|&n| n as f64 + 40.0).product::<f64>() > 1.2e9
-    {
+    let voxels = moduli.iter().filter(|&&e| e > 0.0).count();
+    // The moduli of the whole grid count too, with a flag each.
+    let all: f64 = dims.iter().map(|&n| n as f64).product();
+    let needed = memory_estimate(voxels as f64, model.loads.len()).max(9.0 * all) / 1e6;
+    if needed > options.max_memory {
         return Err(FeError::Memory {
-            dims,
+            voxels: if voxels > 0 { voxels as f64 } else { all },
             needed,
             limit: options.max_memory,
         });
     }
-    if moduli.len() != dims.iter().product::<usize>() || !moduli.iter().any(|&e| e > 0.0) {
+    if moduli.len() != dims.iter().product::<usize>() || voxels == 0 {
         return Err(FeError::Empty { dims, h: model.h });
     }
     Ok(())
@@ -230,27 +262,55 @@ fn levels(dims: [usize; 3], coarsest: usize) -> usize {
         + 1
 }
 
-/// Moduli times edge onto the element field.
+/// Which elements may have stiffness, on the grid whose sides are multiples of `side`.
+fn padded([nx, ny, nz]: [usize; 3], side: usize, moduli: &[f64]) -> Vec<bool> {
+    let n = [nx, ny, nz].map(|n| n.next_multiple_of(side));
+    let mut out = vec![false; n.iter().product()];
+    for (row, moduli) in moduli.chunks_exact(nx).enumerate() {
+        let to = (row / ny * n[1] + row % ny) * n[0];
+        for (to, &e) in out[to..].iter_mut().zip(moduli) {
+            *to = e > 0.0;
+        }
+    }
+    out
+}
+
+/// Moduli times edge onto the field of elements.
 fn spread(grid: &NodeGrid, model: &VoxelModel, moduli: &[f64], e: &mut [f64]) {
     let [nx, ny, nz] = model.dims;
     for z in 0..nz {
         for y in 0..ny {
-            let from = (z * ny + y) * nx;
-            let to = grid.element(0, y, z);
-            for (to, &modulus) in e[to..to + nx].iter_mut().zip(&moduli[from..from + nx]) {
-                *to = modulus * model.h;
+            let row = &moduli[(z * ny + y) * nx..][..nx];
+            for run in grid.row(y, z) {
+                let to = &mut e[grid.first(z) + run.at..][..run.len];
+                // A run of nodes may end one behind the last voxel.
+                for (to, &modulus) in to.iter_mut().zip(&row[run.x..]) {
+                    *to = modulus * model.h;
+                }
             }
         }
     }
 }
 
 /// A load as places and values; forces on fixed degrees of freedom do nothing and are left out.
-fn sparse(frame: &Frame, forces: &[([usize; 3], [f64; 3])]) -> Vec<(u32, f64)> {
-    let mut out: Vec<(u32, f64)> = Vec::new();
-    for &([x, y, z], force) in forces {
+fn sparse(
+    frame: &Frame,
+    model: &VoxelModel,
+    moduli: &[f64],
+    case: usize,
+) -> Result<Vec<(usize, f64)>, FeError> {
+    let mut out: Vec<(usize, f64)> = Vec::new();
+    for &(node, force) in &model.loads[case] {
+        if force == [0.0; 3] {
+            continue;
+        }
+        if !touches(model.dims, moduli, node) {
+            return Err(FeError::LoadOnVoid { case, node });
+        }
         for (c, &f) in force.iter().enumerate() {
-            let at = (frame.grid.node(x, y, z) + c * frame.grid.sx) as u32;
-            if f != 0.0 && frame.fixed.binary_search(&at).is_err() {
+            let place = frame.grid.node(node, c);
+            if let Some(at) = place.filter(|at| f != 0.0 && frame.fixed.binary_search(at).is_err())
+            {
                 out.push((at, f));
             }
         }
@@ -263,5 +323,12 @@ fn sparse(frame: &Frame, forces: &[([usize; 3], [f64; 3])]) -> Vec<(u32, f64)> {
         }
         same
     });
-    out
+    Ok(out)
+}
+
+/// Whether a voxel with stiffness touches a node.
+fn touches([nx, ny, nz]: [usize; 3], moduli: &[f64], [x, y, z]: [usize; 3]) -> bool {
+    let near = |i: usize, n: usize| i.saturating_sub(1)..(i + 1).min(n);
+    near(z, nz)
+        .any(|z| near(y, ny).any(|y| near(x, nx).any(|x| moduli[(z * ny + y) * nx + x] > 0.0)))
 }

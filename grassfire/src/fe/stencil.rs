@@ -1,59 +1,59 @@
 //! Coarse operators: 27 blocks of 3x3 a node, stored sixteen nodes at a time.
 
 use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
 
 use super::grid::{BLOCK, NodeGrid};
+use super::window::Window;
 
 /// Numbers of a block of nodes: 27 neighbours, 9 entries, 16 nodes.
 pub(super) const STRIDE: usize = 27 * 9 * BLOCK;
 
-/// The operator of a coarse grid. Blocks without stiffness are not stored.
+/// The operator of a coarse grid. The stored nodes of a plane are cut into blocks, across the ends of runs and rows.
 pub(super) struct Stencil {
-    /// `[block][neighbour][row][column][node]`, stored blocks only.
+    /// `[block][neighbour][row][column][node]`.
     pub values: Vec<f32>,
-    /// For every block `[z][y][block]` the number of its stored block, or `EMPTY`.
-    pub places: Vec<u32>,
+    /// First block of every plane, and the number of blocks.
+    pub blocks: Vec<usize>,
     arch: Arch,
 }
 
-/// A block without stiffness.
-pub(super) const EMPTY: u32 = u32::MAX;
-
 impl Stencil {
-    pub fn new(places: Vec<u32>) -> Self {
-        let stored = places.iter().filter(|&&p| p != EMPTY).count();
+    pub fn new(grid: &NodeGrid) -> Self {
+        let mut blocks = vec![0];
+        for z in 0..=grid.n[2] {
+            blocks.push(blocks[z] + grid.count(z).div_ceil(BLOCK));
+        }
         Self {
-            values: vec![0.0; stored * STRIDE],
-            places,
+            values: vec![0.0; blocks[grid.n[2] + 1] * STRIDE],
+            blocks,
             arch: Arch::new(),
         }
     }
 
     /// `y = K u`.
     pub fn apply(&self, grid: &NodeGrid, u: &[f32], y: &mut [f32]) {
-        use rayon::prelude::*;
-        let flags = grid.blocks() * (grid.n[1] + 1);
-        grid.planes(y).enumerate().for_each(|(z, out)| {
-            let plane = StencilPlane {
-                grid,
-                z,
-                u,
-                values: &self.values,
-                places: &self.places[z * flags..(z + 1) * flags],
-                out,
-            };
-            self.arch.dispatch(plane);
-        });
+        let window = || Window::new(grid, 3);
+        grid.planes(3, y)
+            .enumerate()
+            .for_each_init(window, |near, (z, out)| {
+                near.clear();
+                let plane = StencilPlane {
+                    grid,
+                    z,
+                    u,
+                    values: &self.values[self.blocks[z] * STRIDE..],
+                    near,
+                    out,
+                };
+                self.arch.dispatch(plane);
+            });
     }
 
-    /// The diagonal entry of component `c` of a node.
-    pub fn diagonal(&self, grid: &NodeGrid, node: [usize; 3], c: usize) -> f32 {
-        let [x, y, z] = node;
-        let block = (z * (grid.n[1] + 1) + y) * grid.blocks() + x / BLOCK;
-        match self.places[block] {
-            EMPTY => 0.0,
-            place => self.values[place as usize * STRIDE + (13 * 9 + 4 * c) * BLOCK + x % BLOCK],
-        }
+    /// The diagonal entry of component `c` of the node at `place` in plane `z`.
+    pub fn diagonal(&self, z: usize, place: usize, c: usize) -> f32 {
+        let block = self.blocks[z] + place / BLOCK;
+        self.values[block * STRIDE + (13 * 9 + 4 * c) * BLOCK + place % BLOCK]
     }
 }
 
@@ -62,8 +62,9 @@ struct StencilPlane<'a> {
     grid: &'a NodeGrid,
     z: usize,
     u: &'a [f32],
+    /// From the first block of the plane.
     values: &'a [f32],
-    places: &'a [u32],
+    near: &'a mut Window<f32>,
     out: &'a mut [f32],
 }
 
@@ -72,37 +73,48 @@ impl WithSimd for StencilPlane<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let grid = self.grid;
-        let (blocks, sx) = (grid.blocks(), grid.sx);
+        let (grid, z) = (self.grid, self.z);
+        let count = grid.count(z);
+        let per = BLOCK / S::F32_LANES;
         for y in 0..=grid.n[1] {
-            for b in 0..blocks {
-                let out = y * grid.row + b * BLOCK;
-                let place = self.places[y * blocks + b];
-                if place == EMPTY {
-                    for c in 0..3 {
-                        self.out[out + c * sx..][..BLOCK].fill(0.0);
-                    }
-                    continue;
-                }
-                let entries = S::as_simd_f32s(&self.values[place as usize * STRIDE..][..STRIDE]).0;
-                let per = BLOCK / S::F32_LANES;
-                let first = grid.node(b * BLOCK, y, self.z) - grid.plane - grid.row - 1;
-                for half in 0..per {
-                    let mut sum = [simd.splat_f32s(0.0); 3];
-                    for n in 0..27 {
-                        let at = first + n / 9 * grid.plane + n / 3 % 3 * grid.row + n % 3;
-                        for c in 0..3 {
-                            let u = &self.u[at + c * sx + half * S::F32_LANES..][..S::F32_LANES];
-                            let v = simd.partial_load_f32s(u);
-                            for (r, sum) in sum.iter_mut().enumerate() {
-                                let k = entries[(n * 9 + r * 3 + c) * per + half];
-                                *sum = simd.mul_add_e_f32s(k, v, *sum);
+            let runs = grid.row(y, z);
+            if runs.is_empty() {
+                continue;
+            }
+            self.near.load(grid, self.u, |v| v, y, z);
+            let near: [[&[f32]; 27]; 3] = std::array::from_fn(|c| {
+                std::array::from_fn(|n| self.near.row(y, n / 3 % 3, n / 9, c))
+            });
+            for run in runs {
+                for block in run.at / BLOCK..(run.at + run.len).div_ceil(BLOCK) {
+                    let entries = &self.values[block * STRIDE..][..STRIDE];
+                    let entries = S::as_simd_f32s(entries).0;
+                    // Where the block begins, counted along this row: other nodes of it belong to other runs.
+                    let first = BLOCK + run.x + block * BLOCK - run.at - 1;
+                    let mut sums = [[0f32; BLOCK]; 3];
+                    for half in 0..per {
+                        let mut sum = [simd.splat_f32s(0.0); 3];
+                        for n in 0..27 {
+                            let at = first + n % 3 + half * S::F32_LANES;
+                            for c in 0..3 {
+                                let v = simd.partial_load_f32s(&near[c][n][at..at + S::F32_LANES]);
+                                for (r, sum) in sum.iter_mut().enumerate() {
+                                    let k = entries[(n * 9 + r * 3 + c) * per + half];
+                                    *sum = simd.mul_add_e_f32s(k, v, *sum);
+                                }
                             }
                         }
+                        for (sums, sum) in sums.iter_mut().zip(sum) {
+                            S::as_mut_simd_f32s(sums).0[half] = sum;
+                        }
                     }
-                    for (c, sum) in sum.into_iter().enumerate() {
-                        let to = out + c * sx + half * S::F32_LANES;
-                        S::as_mut_simd_f32s(&mut self.out[to..to + S::F32_LANES]).0[0] = sum;
+                    let (from, end) = (
+                        run.at.max(block * BLOCK),
+                        (run.at + run.len).min((block + 1) * BLOCK),
+                    );
+                    for (c, sums) in sums.iter().enumerate() {
+                        self.out[c * count + from..c * count + end]
+                            .copy_from_slice(&sums[from - block * BLOCK..end - block * BLOCK]);
                     }
                 }
             }

@@ -34,11 +34,13 @@ fn uniform_cantilever_has_the_known_compliance() {
     let mut solver = Solver::new(model, &moduli, &SolverOptions::default()).unwrap();
     let stats = solver.solve(0, &Monitor::default()).unwrap();
     assert!(stats.iterations <= 12, "{stats:?}");
-    let c = solver.compliance(0);
+    let c = solver.compliance();
     assert!((c / 116.179277 - 1.0).abs() < 1e-5, "{c}");
-    let sum: f64 = solver.energies(0).iter().map(|v| v * e).sum();
+    let mut energies = vec![0.0; moduli.len()];
+    solver.add_energies(e, &mut energies);
+    let sum: f64 = energies.iter().sum();
     assert!((sum / c - 1.0).abs() < 1e-4, "{sum} {c}");
-    let reaction = solver.reactions(0);
+    let reaction = solver.reactions();
     assert!(
         (reaction[1] - 1.0).abs() < 1e-4 && reaction[0].abs() < 1e-4,
         "{reaction:?}"
@@ -82,7 +84,7 @@ fn uniaxial_patch_is_exact() {
     for z in 0..=dims[2] {
         for y in 0..=dims[1] {
             for x in 0..=dims[0] {
-                let u = solver.displacement(0, [x, y, z]);
+                let u = solver.displacement([x, y, z]);
                 let exact = [x as f64, -0.3 * y as f64, -0.3 * z as f64];
                 for c in 0..3 {
                     assert!((u[c] - exact[c]).abs() < 20.0 * 1e-12, "{x} {y} {z}: {u:?}");
@@ -90,6 +92,80 @@ fn uniaxial_patch_is_exact() {
             }
         }
     }
+}
+
+#[test]
+fn voxels_without_stiffness_change_nothing_and_take_no_memory() {
+    // An L of 16 x 12 x 4 voxels with a hole, alone and somewhere in a grid five times as large.
+    let solve = |dims: [usize; 3], at: [usize; 3]| {
+        let mut moduli = vec![0.0; dims.iter().product()];
+        for z in 0..4 {
+            for y in 0..12 {
+                for x in 0..16 {
+                    let arm = x < 5 || y < 4;
+                    let hole = (1..3).contains(&x) && (6..8).contains(&y);
+                    if arm && !hole {
+                        let v = ((at[2] + z) * dims[1] + at[1] + y) * dims[0] + at[0] + x;
+                        moduli[v] = 1.0 + (x + y + z) as f64 / 10.0;
+                    }
+                }
+            }
+        }
+        let node = |x: usize, y: usize, z: usize| [at[0] + x, at[1] + y, at[2] + z];
+        let mut model = VoxelModel {
+            dims,
+            h: 0.5,
+            nu: 0.3,
+            ..VoxelModel::default()
+        };
+        for z in 0..=4 {
+            for x in 0..=5 {
+                model.fixed.extend((0..3).map(|c| (node(x, 12, z), c)));
+            }
+            model.loads.push(vec![(node(16, 2, z), [0.1, -1.0, 0.3])]);
+        }
+        let options = SolverOptions {
+            tolerance: 1e-12,
+            coarsest: 300,
+            ..SolverOptions::default()
+        };
+        let mut solver = Solver::new(model, &moduli, &options).unwrap();
+        let mut out = Vec::new();
+        for case in 0..5 {
+            solver.solve(case, &Monitor::default()).unwrap();
+            let mut energies = vec![0.0; moduli.len()];
+            solver.add_energies(2.0, &mut energies);
+            let all: f64 = energies.iter().zip(&moduli).map(|(u, e)| u * e).sum();
+            out.extend([solver.compliance(), all]);
+            out.extend(solver.displacement(node(16, 4, 0)));
+        }
+        (out, solver.stored_nodes())
+    };
+    let (alone, nodes) = solve([16, 12, 4], [0, 0, 0]);
+    let (inside, stored) = solve([40, 37, 21], [17, 19, 9]);
+    for (a, b) in alone.iter().zip(&inside) {
+        assert!((a - b).abs() < 1e-9 * a.abs().max(1.0), "{a} {b}");
+    }
+    for energies in alone.chunks(5) {
+        assert!(
+            (energies[1] / energies[0] - 2.0).abs() < 1e-9,
+            "{energies:?}"
+        );
+    }
+    assert_eq!(nodes, stored);
+    assert!(nodes < 17 * 13 * 5);
+}
+
+#[test]
+fn a_load_where_no_material_is_has_its_own_error() {
+    let mut model = cantilever(8);
+    model.loads[0][0].0 = [8, 4, 4];
+    let mut moduli = vec![1.0; 8 * 4 * 4];
+    moduli[8 * 4 * 4 - 1] = 0.0;
+    let error = Solver::new(model, &moduli, &SolverOptions::default())
+        .err()
+        .unwrap();
+    assert!(matches!(error, FeError::LoadOnVoid { .. }), "{error}");
 }
 
 #[test]

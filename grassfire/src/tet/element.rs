@@ -4,6 +4,7 @@ use nalgebra::Matrix3;
 
 use super::EDGES;
 use crate::Vec3;
+use crate::fe::material::{self, lame};
 
 /// Barycentric coordinates of the Gauss points: one of them is [`NEAR`], the others are [`FAR`].
 pub(super) const NEAR: f64 = 0.585_410_196_624_968_5;
@@ -65,14 +66,6 @@ pub(super) fn gauss(corners: &[Vec3; 10]) -> [Gauss; 4] {
     })
 }
 
-/// Lame's constants, MPa.
-pub(super) fn lame(young: f64, nu: f64) -> (f64, f64) {
-    (
-        young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)),
-        young / (2.0 * (1.0 + nu)),
-    )
-}
-
 /// Stiffness in blocks of 3 x 3, N/mm: `[i][j]` couples the forces on node i to the displacements of node j. None when the
 /// element is turned inside out.
 pub(super) fn stiffness(
@@ -106,15 +99,12 @@ pub(super) fn stress(
     young: f64,
     nu: f64,
 ) -> [Matrix3<f64>; 4] {
-    let (lambda, mu) = lame(young, nu);
     gauss(corners).map(|point| {
         let mut h = Matrix3::zeros();
         for (u, g) in u.iter().zip(&point.gradients) {
             h += u * g.transpose();
         }
-        let mut s = mu * (h + h.transpose());
-        (0..3).for_each(|d| s[(d, d)] += lambda * h.trace());
-        s
+        material::stress(&h, young, nu)
     })
 }
 
@@ -122,10 +112,4 @@ pub(super) fn stress(
 pub(super) fn at_corners(points: [Matrix3<f64>; 4]) -> [Matrix3<f64>; 4] {
     let sum: Matrix3<f64> = points.iter().sum();
     points.map(|p| (p - FAR * sum) / (NEAR - FAR))
-}
-
-/// Von Mises stress of a tensor, MPa.
-pub(super) fn von_mises(s: &Matrix3<f64>) -> f64 {
-    let deviator = s - Matrix3::identity() * (s.trace() / 3.0);
-    (1.5 * deviator.norm_squared()).sqrt()
 }

@@ -3,10 +3,11 @@
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
-use super::element::{at_corners, gauss, stress, von_mises};
+use super::element::{at_corners, gauss, stress};
 use super::solver::Solution;
 use super::{EDGES, TetLoads, TetMesh, TetModel};
 use crate::Vec3;
+use crate::fe::material::equivalent;
 
 /// One load case.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -38,7 +39,7 @@ pub struct TetCase {
 impl TetCase {
     /// Von Mises stress at every node, MPa.
     pub fn von_mises(&self) -> Vec<f32> {
-        self.stress.iter().map(|s| von_mises(s) as f32).collect()
+        self.stress.iter().map(|s| equivalent(s) as f32).collect()
     }
 }
 
@@ -114,7 +115,7 @@ fn elements(mesh: &TetMesh, model: &TetModel, u: &[Vec3], out: &mut TetCase) -> 
             let sum = &mut sums[n as usize];
             *sum = (sum.0 + nodal(i), sum.1 + 1);
         }
-        let worst = stresses.iter().map(von_mises).fold(0.0, f64::max);
+        let worst = stresses.iter().map(equivalent).fold(0.0, f64::max);
         if worst > out.stress_max && cell.iter().all(|&n| !held[n as usize]) {
             out.stress_max = worst;
             out.stress_place = (corners(mesh, cell)[..4].iter().sum::<Vec3>() / 4.0).into();

@@ -14,18 +14,29 @@ pub struct Chain<'a> {
     /// Demoulding.
     pub hull: Option<Hull>,
     pub(super) symmetry: Symmetry,
+    /// Shift of the threshold for the eroded densities; 0 without.
+    erosion: f64,
 }
 
 /// The fields of one evaluation.
 #[derive(Debug, Clone, Default)]
 pub struct Fields {
-    /// Filtered, frozen voxels full.
+    /// Filtered, frozen voxels full; kept with a hull only.
     filtered: Vec<f64>,
-    /// After the hull.
+    /// After the hull, design voxels only.
     hulled: Vec<f64>,
     /// Densities: 0 outside, 1 where frozen.
     pub rho: Vec<f64>,
+    /// The thinner structure whose stiffness counts, with the robust formulation.
+    pub eroded: Option<Vec<f64>>,
     projection: Option<Projection>,
+}
+
+impl Fields {
+    /// The densities whose stiffness counts.
+    pub fn stiff(&self) -> &[f64] {
+        self.eroded.as_deref().unwrap_or(&self.rho)
+    }
 }
 
 impl<'a> Chain<'a> {
@@ -50,6 +61,7 @@ impl<'a> Chain<'a> {
             filter,
             hull: hull(problem, options)?,
             symmetry,
+            erosion: options.robust,
         };
         chain.check_frozen()?;
         Ok(chain)
@@ -94,56 +106,54 @@ impl<'a> Chain<'a> {
                 _ => {}
             }
         }
-        let hulled = match &self.hull {
-            Some(hull) => hull.smooth(&filtered),
-            None => filtered.clone(),
+        let (filtered, hulled) = match &self.hull {
+            Some(hull) => {
+                let hulled = hull.smooth(&filtered);
+                (filtered, hulled)
+            }
+            None => (Vec::new(), filtered),
         };
-        let design = |m: &[f64]| -> Vec<f64> {
-            let pairs = m.iter().zip(labels);
-            pairs
-                .filter(|(_, l)| **l == DESIGN)
-                .map(|(&v, _)| v)
-                .collect()
+        let hulled: Vec<f64> = self.problem.design().map(|v| hulled[v]).collect();
+        let projection = beta.map(|beta| Projection::keeping_volume(beta, &hulled));
+        let densities = |projection: Option<Projection>| -> Vec<f64> {
+            let frozen = |&l: &u8| f64::from(u8::from(l == FROZEN));
+            let mut rho: Vec<f64> = labels.iter().map(frozen).collect();
+            for (v, &m) in self.problem.design().zip(&hulled) {
+                rho[v] = projection.map_or(m, |p| p.value(m)).clamp(0.0, 1.0);
+            }
+            self.symmetry.copy(self.problem, &mut rho);
+            rho
         };
-        let projection = beta.map(|beta| Projection::keeping_volume(beta, &design(&hulled)));
-        let mut rho: Vec<f64> = hulled
-            .iter()
-            .zip(labels)
-            .map(|(&v, &label)| match label {
-                OUTSIDE | CORE => 0.0,
-                FROZEN => 1.0,
-                _ => projection.map_or(v, |p| p.value(v)).clamp(0.0, 1.0),
-            })
-            .collect();
-        self.symmetry.copy(self.problem, &mut rho);
+        let eroded = projection.filter(|_| self.erosion > 0.0);
         Fields {
+            rho: densities(projection),
+            eroded: eroded.map(|p| densities(Some(p.shifted(self.erosion)))),
             filtered,
             hulled,
-            rho,
             projection,
         }
     }
 
-    /// Gradient by the variables of a function with gradient `g` by the densities. The threshold of the projection
-    /// follows the variables, which is part of the derivative.
+    /// Gradient by the variables of a function with gradient `g` by the densities whose stiffness counts. The threshold of
+    /// the projection follows the variables, which is part of the derivative.
     pub fn gradient(&self, fields: &Fields, g: &[f64]) -> Vec<f64> {
-        let design = |v: usize| self.problem.labels[v] == DESIGN;
+        let design = || self.problem.design().zip(&fields.hulled);
         let mut of_hulled = vec![0.0; g.len()];
         match fields.projection {
-            None => (0..g.len())
-                .filter(|&v| design(v))
-                .for_each(|v| of_hulled[v] = g[v]),
+            None => design().for_each(|(v, _)| of_hulled[v] = g[v]),
             Some(p) => {
+                let stiff = p.shifted(self.erosion);
+                // At the end of its range the shifted threshold stands still.
+                let still = self.erosion > 0.0 && stiff.eta >= Projection::LAST;
+                let follows = if still { 0.0 } else { 1.0 };
                 let (mut top, mut bottom) = (0.0, 0.0);
-                for v in (0..g.len()).filter(|&v| design(v)) {
-                    let by_eta = p.by_eta(fields.hulled[v]);
-                    top += g[v] * by_eta;
-                    bottom += by_eta;
+                for (v, &m) in design() {
+                    top += g[v] * follows * stiff.by_eta(m);
+                    bottom += p.by_eta(m);
                 }
                 let factor = if bottom == 0.0 { 0.0 } else { top / bottom };
-                for v in (0..g.len()).filter(|&v| design(v)) {
-                    let slope = p.slope(fields.hulled[v]);
-                    of_hulled[v] = g[v] * slope + factor * (1.0 - slope);
+                for (v, &m) in design() {
+                    of_hulled[v] = g[v] * stiff.slope(m) + factor * (1.0 - p.slope(m));
                 }
             }
         }
@@ -152,11 +162,8 @@ impl<'a> Chain<'a> {
 
     /// Gradient of the volume (in voxels) by the variables; the projection does not change it.
     pub fn volume_gradient(&self, fields: &Fields) -> Vec<f64> {
-        let labels = &self.problem.labels;
-        let ones = labels
-            .iter()
-            .map(|&l| f64::from(u8::from(l == DESIGN)))
-            .collect();
+        let design = |&l: &u8| f64::from(u8::from(l == DESIGN));
+        let ones = self.problem.labels.iter().map(design).collect();
         self.to_variables(fields, ones)
     }
 

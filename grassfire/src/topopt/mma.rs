@@ -4,6 +4,9 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Variables that are summed together: sums do not depend on the threads.
+const CHUNK: usize = 1 << 14;
+
 /// Constants of the asymptotes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -68,23 +71,20 @@ impl Mma {
     /// doi:10.1002/nme.1620240207.
     pub fn update(&mut self, x: &[f64], df: &[f64], g: f64, dg: &[f64], step: f64) -> Vec<f64> {
         self.move_asymptotes(x);
-        let terms: Vec<Term> = (0..x.len())
-            .into_par_iter()
-            .map(|i| self.term(i, x[i], [df[i], dg[i]], step))
-            .collect();
-        let at_x: Vec<f64> = terms
-            .par_chunks(1 << 14)
-            .zip(x.par_chunks(1 << 14))
-            .map(|(terms, x)| terms.iter().zip(x).map(|(t, &x)| t.constraint(x)).sum())
-            .collect();
-        let rest = g - at_x.iter().sum::<f64>();
-        let violation = |multiplier: f64| -> f64 {
-            let parts: Vec<f64> = terms
-                .par_chunks(1 << 14)
-                .map(|terms| terms.iter().map(|t| t.constraint(t.best(multiplier))).sum())
+        // Terms are made again for every multiplier: storing them would take more memory than all else here.
+        let sum = |of: &(dyn Fn(&Term, f64) -> f64 + Sync)| -> f64 {
+            let parts: Vec<f64> = (0..x.len().div_ceil(CHUNK))
+                .into_par_iter()
+                .map(|chunk| {
+                    let all = chunk * CHUNK..x.len().min((chunk + 1) * CHUNK);
+                    all.map(|i| of(&self.term(i, x[i], [df[i], dg[i]], step), x[i]))
+                        .sum()
+                })
                 .collect();
-            rest + parts.iter().sum::<f64>()
+            parts.iter().sum()
         };
+        let rest = g - sum(&|term, x| term.constraint(x));
+        let violation = |m: f64| rest + sum(&|term, _| term.constraint(term.best(m)));
         let (mut a, mut b) = (1e-12f64, 1e12f64);
         while b / a > 1.0 + 1e-7 {
             let middle = (a * b).sqrt();
@@ -94,10 +94,16 @@ impl Mma {
                 b = middle;
             }
         }
-        let new: Vec<f64> = terms
-            .par_iter()
-            .zip(x)
-            .map(|(t, &x)| if t.high > t.low { t.best(b) } else { x })
+        let new: Vec<f64> = (0..x.len())
+            .into_par_iter()
+            .map(|i| {
+                let term = self.term(i, x[i], [df[i], dg[i]], step);
+                if term.high > term.low {
+                    term.best(b)
+                } else {
+                    x[i]
+                }
+            })
             .collect();
         self.before = std::mem::replace(&mut self.last, x.to_vec());
         new

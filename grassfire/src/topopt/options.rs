@@ -138,6 +138,10 @@ pub struct OptimizeOptions {
     pub penalty_every: usize,
     /// Sharpness of the projection at the end; 0 switches the projection off.
     pub beta: f64,
+    /// Robust formulation: the threshold of the projection is larger by this for the densities whose stiffness counts, so
+    /// that members hold when they are eroded, and hinges and walls of one voxel do not pay. 0 switches it off; 0.2 with a
+    /// filter radius R keeps members thicker than about R.
+    pub robust: f64,
     /// Iteration at which the sharpness begins to double.
     pub beta_start: usize,
     /// Iterations between two doublings.
@@ -172,6 +176,7 @@ impl Default for OptimizeOptions {
             penalty_step: 0.25,
             penalty_every: 5,
             beta: 32.0,
+            robust: 0.0,
             beta_start: 45,
             beta_every: 15,
             e_min: 1e-6,
@@ -221,7 +226,7 @@ impl OptimizeOptions {
     /// # Errors
     /// [`TopoptError::Option`].
     pub fn check(&self, h: f64) -> Result<(), TopoptError> {
-        let ranges: [(&'static str, f64, f64, f64, &'static str); 9] = [
+        let ranges: [(&'static str, f64, f64, f64, &'static str); 10] = [
             (
                 "volume_fraction",
                 self.volume_fraction,
@@ -248,6 +253,7 @@ impl OptimizeOptions {
             ("penalty_start", self.penalty_start, 1.0, 10.0, "1 to 10"),
             ("penalty_step", self.penalty_step, 0.0, 10.0, "0 to 10"),
             ("beta", self.beta, 0.0, 512.0, "0 to 512"),
+            ("robust", self.robust, 0.0, 0.45, "0 to 0.45"),
             ("e_min", self.e_min, 1e-12, 0.1, "1e-12 to 0.1"),
         ];
         for (name, value, low, high, wanted) in ranges {
@@ -258,6 +264,13 @@ impl OptimizeOptions {
                     wanted,
                 });
             }
+        }
+        if self.robust > 0.0 && self.beta == 0.0 {
+            return Err(TopoptError::Option {
+                name: "robust",
+                value: self.robust,
+                wanted: "0 where nothing is projected (beta = 0)",
+            });
         }
         Ok(())
     }

@@ -50,6 +50,12 @@ impl Problem {
         matches!(self.labels[voxel], DESIGN | FROZEN)
     }
 
+    /// The voxels that may be full or empty, ascending.
+    pub fn design(&self) -> impl Iterator<Item = usize> + '_ {
+        let labels = self.labels.iter().enumerate();
+        labels.filter(|(_, l)| **l == DESIGN).map(|(v, _)| v)
+    }
+
     /// Number of voxels with a label.
     pub fn count(&self, label: u8) -> usize {
         self.labels.iter().filter(|&&l| l == label).count()

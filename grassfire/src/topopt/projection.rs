@@ -13,6 +13,20 @@ pub(super) struct Projection {
 }
 
 impl Projection {
+    /// The largest threshold after a shift.
+    pub const LAST: f64 = 0.95;
+
+    /// With a threshold that is larger by `erosion`: everything becomes thinner by about the same.
+    pub fn shifted(self, erosion: f64) -> Self {
+        if erosion == 0.0 {
+            return self;
+        }
+        Self {
+            eta: (self.eta + erosion).min(Self::LAST),
+            ..self
+        }
+    }
+
     /// The threshold that keeps the sum of `x`, by bisection.
     pub fn keeping_volume(beta: f64, x: &[f64]) -> Self {
         let goal: f64 = x.iter().sum();

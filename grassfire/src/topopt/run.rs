@@ -26,7 +26,7 @@ const QUIET: usize = 5;
 pub struct HistoryEntry {
     /// From 1.
     pub iteration: usize,
-    /// f'u over the weighted cases, N mm.
+    /// f'u over the weighted cases, N mm; with the robust formulation of the eroded structure.
     pub compliance: f64,
     /// Volume over that of the space.
     pub volume_fraction: f64,
@@ -93,14 +93,13 @@ pub fn optimize(
     let mut run = Run::new(problem, options, solver_options, resume, monitor)?;
     run.warn_asymmetry(monitor);
     let mut out = Optimized::default();
-    let mut fields = Fields::default();
     while run.state.iteration < options.max_iterations {
         let i = run.state.iteration;
         let done = i as f64 / options.max_iterations as f64;
         let asked = monitor.step(STAGE, &format!("iteration {}", i + 1), done);
         let stopped = match asked.map_err(TopoptError::from) {
             Err(e) => Err(e),
-            Ok(()) => run.iterate(monitor, &mut fields, &mut out),
+            Ok(()) => run.iterate(monitor, &mut out),
         };
         match stopped {
             Ok(ended) => {
@@ -122,11 +121,20 @@ pub fn optimize(
             Err(e) => return Err(e),
         }
     }
-    out.rho = std::mem::take(&mut run.state.rho);
-    out.binary = binary(problem, &run.chain, &out.rho, run.target);
-    out.symmetry_error = run.chain.symmetry.error(problem, &out.rho).0;
-    out.fallbacks = run.fallbacks;
-    out.first_compliance = run.state.compliance[0];
+    let Run {
+        chain,
+        solver,
+        state,
+        target,
+        fallbacks,
+        ..
+    } = run;
+    drop(solver);
+    out.rho = state.rho;
+    out.binary = binary(problem, &chain, &out.rho, target);
+    out.symmetry_error = chain.symmetry.error(problem, &out.rho).0;
+    out.fallbacks = fallbacks;
+    out.first_compliance = state.compliance[0];
     Ok(out)
 }
 
@@ -141,10 +149,11 @@ pub fn validate(
 ) -> Result<(), TopoptError> {
     options.check(problem.h)?;
     target(problem, options)?;
-    let needed = crate::fe::memory_estimate(problem.dims, problem.cases.len()) / 1e6;
+    let voxels = (problem.count(DESIGN) + problem.count(FROZEN)) as f64;
+    let needed = crate::fe::memory_estimate(voxels, problem.cases.len()) / 1e6;
     if needed > solver.max_memory {
         return Err(TopoptError::Fe(FeError::Memory {
-            dims: problem.dims,
+            voxels,
             needed,
             limit: solver.max_memory,
         }));
@@ -179,7 +188,8 @@ struct Run<'a> {
     chain: Chain<'a>,
     solver: Solver,
     state: State,
-    free: Vec<bool>,
+    /// Voxels of the variables.
+    design: Vec<u32>,
     /// Full voxels allowed.
     target: f64,
     /// Design and frozen voxels.
@@ -207,16 +217,10 @@ impl<'a> Run<'a> {
         let (design, frozen) = (problem.count(DESIGN) as f64, problem.count(FROZEN) as f64);
         let active = design + frozen;
         let chain = Chain::new(problem, options)?;
-        let free: Vec<bool> = problem.labels.iter().map(|&l| l == DESIGN).collect();
         let state = resume.unwrap_or_else(|| {
             let start = ((target - frozen) / design).min(1.0);
-            let value = |&l: &u8| match l {
-                DESIGN => start,
-                FROZEN => 1.0,
-                _ => 0.0,
-            };
             State {
-                x: problem.labels.iter().map(value).collect(),
+                x: vec![start; design as usize],
                 rho: vec![0.0; problem.labels.len()],
                 ..State::default()
             }
@@ -238,7 +242,7 @@ impl<'a> Run<'a> {
             chain,
             solver,
             state,
-            free,
+            design: problem.design().map(|v| v as u32).collect(),
             target,
             active,
             fallbacks: 0,
@@ -257,37 +261,21 @@ impl<'a> Run<'a> {
     }
 
     /// One iteration; true when the run has converged.
-    fn iterate(
-        &mut self,
-        monitor: &Monitor,
-        fields: &mut Fields,
-        out: &mut Optimized,
-    ) -> Result<bool, TopoptError> {
+    fn iterate(&mut self, monitor: &Monitor, out: &mut Optimized) -> Result<bool, TopoptError> {
         let start = Instant::now();
         let i = self.state.iteration;
         let penalty = self.options.penalty_at(i);
         let beta = (self.options.beta > 0.0).then(|| self.options.beta_at(i));
-        *fields = self.chain.forward(&self.state.x, beta);
-        let response = self.respond(&fields.rho, penalty, monitor)?;
-        let e_min = self.options.e_min;
-        let slope = |rho: f64| -penalty * rho.powf(penalty - 1.0) * (1.0 - e_min);
-        let young = self.problem.young;
-        let g: Vec<f64> = fields
-            .rho
-            .par_iter()
-            .zip(&response.energy)
-            .map(|(&rho, &energy)| young * slope(rho) * energy)
-            .collect();
-        let df = self.chain.gradient(fields, &g);
-        let dv = self.chain.volume_gradient(fields);
-        let volume: f64 = fields.rho.iter().sum();
-        let previous = std::mem::replace(&mut self.state.rho, fields.rho.clone());
-        let change = previous
-            .iter()
-            .zip(&fields.rho)
-            .map(|(a, b)| (a - b).abs())
-            .sum::<f64>()
-            / self.active;
+        let mut fields = self.chain.forward(&self.on_grid(&self.state.x), beta);
+        // The densities of the last iteration go before the solver takes its memory.
+        let change = mean_change(&self.state.rho, &fields.rho, self.active);
+        self.state.rho = std::mem::take(&mut fields.rho);
+        let stiff = fields.eroded.take();
+        let response = self.respond(stiff.as_deref(), penalty, monitor)?;
+        let (df, dv) = self.gradients(&fields, stiff, penalty, response.energy);
+        let rho = &self.state.rho;
+        let volume: f64 = rho.iter().sum();
+        let grayness = 4.0 * rho.iter().map(|r| r * (1.0 - r)).sum::<f64>() / self.active;
         let last = std::mem::replace(&mut self.state.compliance[1], response.compliance);
         if i == 0 {
             self.state.compliance[0] = response.compliance;
@@ -307,7 +295,7 @@ impl<'a> Run<'a> {
             iteration: i + 1,
             compliance: response.compliance,
             volume_fraction: volume / self.active,
-            grayness: 4.0 * fields.rho.iter().map(|r| r * (1.0 - r)).sum::<f64>() / self.active,
+            grayness,
             change,
             penalty,
             beta: beta.unwrap_or(0.0),
@@ -317,92 +305,134 @@ impl<'a> Run<'a> {
         Ok(ended)
     }
 
+    /// Gradients of compliance and volume by the variables.
+    fn gradients(
+        &self,
+        fields: &Fields,
+        stiff: Option<Vec<f64>>,
+        penalty: f64,
+        energy: Vec<f64>,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let rho = stiff.as_ref().unwrap_or(&self.state.rho);
+        let slope = -penalty * (1.0 - self.options.e_min) * self.problem.young;
+        let mut g = energy;
+        g.par_iter_mut()
+            .zip(rho)
+            .for_each(|(g, &rho)| *g *= slope * rho.powf(penalty - 1.0));
+        let df = self.at_design(&self.chain.gradient(fields, &g));
+        (df, self.at_design(&self.chain.volume_gradient(fields)))
+    }
+
+    /// Values of the variables on the grid: 1 where frozen, 0 outside.
+    fn on_grid(&self, x: &[f64]) -> Vec<f64> {
+        let frozen = |&l: &u8| f64::from(u8::from(l == FROZEN));
+        let mut out: Vec<f64> = self.problem.labels.iter().map(frozen).collect();
+        for (&v, &x) in self.design.iter().zip(x) {
+            out[v as usize] = x;
+        }
+        out
+    }
+
+    /// Values of the design voxels.
+    fn at_design(&self, field: &[f64]) -> Vec<f64> {
+        self.design.iter().map(|&v| field[v as usize]).collect()
+    }
+
     /// New variables.
     fn update(&mut self, df: &[f64], dv: &[f64], volume: f64) {
         let step = self.options.limit();
-        let mut x = match self.options.update {
-            UpdateKind::Oc => oc::update(
-                &self.state.x,
-                &self.free,
-                df,
-                dv,
-                self.target - volume,
-                step,
-            ),
+        let x = match self.options.update {
+            UpdateKind::Oc => {
+                let room = self.target - volume;
+                oc::update(&self.state.x, df, dv, room, step)
+            }
             UpdateKind::Mma => {
                 let scale = 100.0 / self.state.compliance[0];
                 let df: Vec<f64> = df.iter().map(|d| d * scale).collect();
                 let dv: Vec<f64> = dv.iter().map(|d| d / self.target).collect();
-                self.state
-                    .mma
-                    .update(&self.state.x, &df, volume / self.target - 1.0, &dv, step)
+                let over = volume / self.target - 1.0;
+                self.state.mma.update(&self.state.x, &df, over, &dv, step)
             }
         };
-        self.chain.symmetry.copy(self.problem, &mut x);
-        self.state.x = x;
+        let mut field = self.on_grid(&x);
+        self.chain.symmetry.copy(self.problem, &mut field);
+        self.state.x = self.at_design(&field);
     }
 
-    /// Solves all load cases for the densities.
+    /// Solves all load cases for the densities `stiff`, or else those of the state.
     fn respond(
         &mut self,
-        rho: &[f64],
+        stiff: Option<&[f64]>,
         penalty: f64,
         monitor: &Monitor,
     ) -> Result<Response, TopoptError> {
         let count = self.problem.cases.len();
-        self.solver
-            .set_moduli(&self.moduli(rho, penalty, self.options.e_min))?;
-        let mut iterations = 0;
-        let mut case = 0;
+        let moduli = |run: &Self, e_min| {
+            let rho = stiff.unwrap_or(&run.state.rho);
+            run.moduli(rho, penalty, e_min)
+        };
+        self.solver.set_moduli(&moduli(self, self.options.e_min))?;
+        let mut out = Response {
+            cases: Vec::new(),
+            compliance: 0.0,
+            energy: vec![0.0; self.problem.labels.len()],
+            iterations: 0,
+        };
+        let mut top = 0.0;
         let mut raised = false;
-        while case < count {
+        while out.cases.len() < count {
+            let case = out.cases.len();
             match self.solver.solve(case, monitor) {
                 Ok(stats) => {
-                    iterations += stats.iterations;
-                    case += 1;
+                    out.iterations += stats.iterations;
+                    self.add(case, &mut out, &mut top);
                 }
                 Err(e @ FeError::NotConverged { .. }) if raised => return Err(e.into()),
                 Err(FeError::NotConverged { iterations: n, .. }) => {
                     // Loose material that floats in almost nothing defeats the multigrid.
                     raised = true;
-                    iterations += n;
+                    out.iterations += n;
                     if self.fallbacks == 0 {
                         monitor.warn(STAGE, format!("iteration {}: the solver did not converge in {n} iterations; solved with empty voxels at {RAISED_MIN} of the modulus", self.state.iteration + 1));
                     }
                     self.fallbacks += 1;
                     self.solver.restart();
-                    self.solver
-                        .set_moduli(&self.moduli(rho, penalty, RAISED_MIN))?;
-                    case = 0;
+                    self.solver.set_moduli(&moduli(self, RAISED_MIN))?;
+                    out.cases.clear();
+                    out.energy.fill(0.0);
+                    top = 0.0;
                 }
                 Err(e) => return Err(e.into()),
             }
         }
-        let cases: Vec<f64> = (0..count).map(|k| self.solver.compliance(k)).collect();
-        let weighted: Vec<f64> = cases
-            .iter()
-            .zip(&self.problem.cases)
-            .map(|(c, k)| c * k.weight)
-            .collect();
-        let (compliance, shares) = match self.options.objective {
-            Objective::Weighted => (weighted.iter().sum(), vec![1.0; count]),
-            Objective::Worst => worst(&weighted),
+        let weighted = out.cases.iter().zip(&self.problem.cases);
+        let weighted: Vec<f64> = weighted.map(|(c, case)| c * case.weight).collect();
+        out.compliance = match self.options.objective {
+            Objective::Weighted => weighted.iter().sum(),
+            Objective::Worst => {
+                let norm = norm(&weighted);
+                scale(&mut out.energy, (top / norm).powf(NORM - 1.0));
+                norm
+            }
         };
-        let mut energy = vec![0.0; rho.len()];
-        for (k, share) in shares.iter().enumerate() {
-            let factor = share * self.problem.cases[k].weight;
-            let of_case = self.solver.energies(k);
-            energy
-                .par_iter_mut()
-                .zip(&of_case)
-                .for_each(|(sum, e)| *sum += factor * e);
+        Ok(out)
+    }
+
+    /// Adds the case just solved. For the worst case energies are kept relative to `top`, the largest weighted compliance
+    /// so far: the norm is known at the end only, and the displacements of one case at a time are in memory.
+    fn add(&self, case: usize, out: &mut Response, top: &mut f64) {
+        let compliance = self.solver.compliance();
+        let mut factor = self.problem.cases[case].weight;
+        if self.options.objective == Objective::Worst {
+            let weighted = factor * compliance;
+            if weighted > *top {
+                scale(&mut out.energy, (*top / weighted).powf(NORM - 1.0));
+                *top = weighted;
+            }
+            factor *= (weighted / top.max(f64::MIN_POSITIVE)).powf(NORM - 1.0);
         }
-        Ok(Response {
-            cases,
-            compliance,
-            energy,
-            iterations,
-        })
+        out.cases.push(compliance);
+        self.solver.add_energies(factor, &mut out.energy);
     }
 
     fn moduli(&self, rho: &[f64], penalty: f64, e_min: f64) -> Vec<f64> {
@@ -419,16 +449,22 @@ impl<'a> Run<'a> {
     }
 }
 
-/// The p-norm of the compliances and its derivatives.
-fn worst(c: &[f64]) -> (f64, Vec<f64>) {
+/// Mean difference of two fields over `count` voxels.
+fn mean_change(a: &[f64], b: &[f64], count: f64) -> f64 {
+    let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    differences.sum::<f64>() / count
+}
+
+/// The p-norm of the compliances; its derivatives are `(c / norm)^(p - 1)`.
+fn norm(c: &[f64]) -> f64 {
     let top = c
         .iter()
         .fold(0.0f64, |m, &v| m.max(v))
         .max(f64::MIN_POSITIVE);
     let sum: f64 = c.iter().map(|v| (v / top).powf(NORM)).sum();
-    let norm = top * sum.powf(1.0 / NORM);
-    (
-        norm,
-        c.iter().map(|v| (v / norm).powf(NORM - 1.0)).collect(),
-    )
+    top * sum.powf(1.0 / NORM)
+}
+
+fn scale(field: &mut [f64], factor: f64) {
+    field.par_iter_mut().for_each(|v| *v *= factor);
 }

@@ -13,7 +13,7 @@ use crate::io::{IoError, atomic_write};
 pub struct State {
     /// Iterations done.
     pub iteration: usize,
-    /// Variables.
+    /// Variables, one a design voxel.
     pub x: Vec<f64>,
     /// Densities of the last iteration.
     pub rho: Vec<f64>,
@@ -93,12 +93,13 @@ impl State {
         if header.problem != fingerprint(problem, options) {
             return Err(bad("its voxels, loads or options differ"));
         }
-        let n = problem.labels.len();
+        let (n, all) = (problem.design().count(), problem.labels.len());
         let data = &bytes[end + 1..];
         let fits = header.lengths.len() == 6
-            && header.lengths.iter().all(|&l| l == 0 || l == n)
+            && header.lengths[..2] == [n, all]
+            && header.lengths[2..].iter().all(|&l| l == 0 || l == n)
             && data.len() == 8 * header.lengths.iter().sum::<usize>();
-        if !fits || header.lengths[0] != n {
+        if !fits {
             return Err(bad("it is damaged"));
         }
         let mut numbers = data.chunks_exact(8).map(|c| {

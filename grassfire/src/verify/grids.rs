@@ -41,9 +41,12 @@ pub(super) fn choose(
     let Some((low, high)) = mesh.bounds().filter(|_| !mesh.triangles.is_empty()) else {
         return Err(VerifyError::Empty);
     };
+    let (volume, area) = (mesh.volume().abs(), mesh.area());
     let layout = |h: f64| -> Result<Layout, CaseError> {
         let margin = Vec3::repeat(h);
-        let (origin, dims) = place_grid(case, h, low - margin, high + margin)?;
+        // Voxels that the surface cuts count whole.
+        let filled = volume + h * area;
+        let (origin, dims) = place_grid(case, h, low - margin, high + margin, filled)?;
         Ok(Layout { origin, h, dims })
     };
     if let Some(h) = options.h {
@@ -63,7 +66,7 @@ pub(super) fn choose(
         };
     }
     let size = high - low;
-    let wall = 2.0 * mesh.volume() / mesh.area();
+    let wall = 2.0 * volume / area;
     let wanted = wall / options.voxels_across;
     let count = |h: f64| size.map(|s| s / h + 2.0).product();
     let mut h = wanted;

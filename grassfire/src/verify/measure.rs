@@ -150,13 +150,13 @@ pub(super) fn solve(
         let stats = solver.solve(k, monitor)?;
         let mut result = CaseResult {
             name: table.name.clone(),
-            strain_energy: solver.compliance(k) / 2.0,
+            strain_energy: solver.compliance() / 2.0,
             iterations: stats.iterations,
-            reaction_error: reaction_error(&mut solver, k),
+            reaction_error: reaction_error(&solver, k),
             ..CaseResult::default()
         };
-        displacements(&solver, k, &problem, &grid, &out.nodes, &mut result);
-        let stress = von_mises(&solver, k, young, &voxels);
+        displacements(&solver, &problem, &grid, &out.nodes, &mut result);
+        let stress = von_mises(&solver, young, &voxels);
         for (i, (&v, &s)) in voxels.iter().zip(&stress).enumerate() {
             out.von_mises[i] = out.von_mises[i].max(s as f32);
             if trusted[v] && result.stress_max.is_none_or(|most| s > most) {
@@ -188,8 +188,8 @@ fn trusted(problem: &Problem, grid: &Fractions, fixed: &[([usize; 3], usize)]) -
 }
 
 /// How far the reactions are from balancing the loads, relative to the loads. Forces on fixed nodes never enter the solver.
-fn reaction_error(solver: &mut Solver, case: usize) -> f64 {
-    let mut sum = solver.reactions(case);
+fn reaction_error(solver: &Solver, case: usize) -> f64 {
+    let mut sum = solver.reactions();
     let model = solver.model();
     let mut size = 0.0;
     for (node, force) in &model.loads[case] {
@@ -207,14 +207,13 @@ fn reaction_error(solver: &mut Solver, case: usize) -> f64 {
 /// Displacements of all nodes and the largest one.
 fn displacements(
     solver: &Solver,
-    case: usize,
     problem: &Problem,
     grid: &Fractions,
     nodes: &[[usize; 3]],
     result: &mut CaseResult,
 ) {
     for &node in nodes {
-        let u = solver.displacement(case, node);
+        let u = solver.displacement(node);
         let size = u.iter().map(|v| v * v).sum::<f64>().sqrt();
         let solid = || around(problem, node).any(|v| grid.values[v] >= SOLID);
         if size > result.u_max && solid() {
