@@ -36,10 +36,11 @@ test: ## format, lints, all tests (with the corpus where it is), checks of the d
 	@tools/setup.sh test
 	tools/test.sh
 
-bench: setup ## speed beside others: medial stage and CGAL (installs libcgal-dev), optimizer and pyMOTO (from PyPI); of the faces
+bench: setup ## speed beside others: medial stage and CGAL (installs libcgal-dev), optimizer and pyMOTO, quads and Instant Meshes and QuadriFlow (from PyPI); of the faces
 	@. tools/env.sh
 	grassfire/benches/cgal/run.sh
 	grassfire/benches/topopt/run.sh
+	grassfire/benches/peers/run.sh
 	$(CARGO) bench --locked -p grassfire --no-default-features --bench spline
 
 corpus: build ## the real and the bad parts of $(CORPUS)

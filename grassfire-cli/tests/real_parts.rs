@@ -161,6 +161,24 @@ fn one_and_two_threads_write_the_same_bytes() {
     }
 }
 
+#[test]
+fn a_bulky_design_space_becomes_a_valid_solid_at_a_coarse_voxel() {
+    let Some((_folder, run)) = run("topadd_bracket_DES.stl", &["--voxel", "5"]) else {
+        return;
+    };
+    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+    let report = run.report();
+    for check in report["checks"].as_array().expect("checks") {
+        assert_eq!(check["met"], true, "{check}");
+    }
+    let solid = &report["solid"];
+    assert_eq!(
+        (&solid["valid"], &solid["bodies"], &solid["genus"]),
+        (&Value::Bool(true), &1.into(), &4.into())
+    );
+    assert_eq!(report["body"]["self_intersections"], 0);
+}
+
 /// A file without the line that carries the time of writing (STEP's `FILE_NAME`).
 fn without_time(bytes: &[u8]) -> Vec<u8> {
     let lines = bytes.split_inclusive(|byte| *byte == b'\n');

@@ -11,6 +11,8 @@ use grassfire::io::{Input, ReadOptions, read_input};
 use grassfire::mesh::{RepairOptions, TriMesh, repair};
 use grassfire::monitor::Monitor;
 use grassfire::non_design::{RecogniseOptions, Recognised, recognise};
+use grassfire::remesh::{RemeshOptions, iso_surface};
+use grassfire::voxel::VoxelGrid;
 
 type Result<T = ()> = std::result::Result<T, Box<dyn Error>>;
 
@@ -62,6 +64,23 @@ fn find(part: &TriMesh) -> Result<Recognised> {
         &RecogniseOptions::default(),
         &Monitor::default(),
     )?)
+}
+
+#[test]
+fn a_band_of_a_hollow_ball_is_no_bore() -> Result {
+    let (voxel, thickness) = (0.844, 3.375);
+    for radius in [8.0, 8.15, 8.3, 8.45, 8.6] {
+        let mut density = VoxelGrid::filled(Vec3::repeat(-11.2), voxel, [28; 3], 0.0_f32);
+        for at in 0..density.values.len() {
+            let [i, j, k] = density.ijk(at);
+            let off = (density.centre(i, j, k).norm() - radius).abs();
+            density.values[at] = (0.5 + (0.5 * thickness - off) / voxel) as f32;
+        }
+        let (options, monitor) = (RemeshOptions::default(), Monitor::default());
+        let found = find(&iso_surface(&density, 0.5, &options, &monitor)?)?;
+        assert!(found.bosses.is_empty(), "{radius}: {:?}", found.bosses);
+    }
+    Ok(())
 }
 
 #[test]

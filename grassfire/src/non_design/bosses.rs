@@ -43,6 +43,9 @@ const THIN: f64 = 0.15;
 const MIN_SLEEVE: f64 = 0.05;
 /// A bore's wall is at least this long, as a share of its radius.
 const MIN_LENGTH: f64 = 0.1;
+/// How far a ball around the rim of a bore bulges out of it, over the rms of the bore's points: with less the wall may as
+/// well be a band of a ball, for which this is 3.4 at most (the bulge is a parabola); bores of real parts have 100 and more.
+const MIN_BULGE: f64 = 5.0;
 
 /// Pairs bores with walls and end planes. For each candidate that is no plane: a boss, or why it is none.
 ///
@@ -149,6 +152,11 @@ impl Scene<'_> {
             return Err(format!(
                 "its wall is only {:.3} mm long all around",
                 length.max(0.0)
+            ));
+        }
+        if length * length / (8.0 * radius) < MIN_BULGE * candidate.rms {
+            return Err(format!(
+                "its wall of {length:.3} mm may as well be a band of a ball"
             ));
         }
         if self.any_inside(&axis.ring((wall_extent[0] + wall_extent[1]) / 2.0, 0.7)) {
