@@ -26,7 +26,8 @@ use crate::voxel::VoxelGrid;
 #[serde(default, deny_unknown_fields)]
 pub struct RetryOptions {
     /// Quad sizes to try in turn, as multiples of `skeleton.size_factor` (or `skeleton.quad_size`), until a body does
-    /// not cut itself and follows the proposal within `report.limits`. A skeleton drawn elsewhere is tried once.
+    /// not cut itself and follows the proposal within `report.limits`. After a body that cuts itself sizes above 1 come
+    /// first. A skeleton drawn elsewhere is tried once.
     pub quad_sizes: Vec<f64>,
 }
 
@@ -143,12 +144,14 @@ impl Workshop<'_> {
             stage: "skeleton",
             source: StageError::NoQuadSize,
         });
-        for (attempt, &size) in sizes.iter().enumerate() {
+        let (mut left, mut attempt) = (sizes.to_vec(), 0);
+        loop {
             let sound = best.as_ref().map(|(score, _)| score.sound());
-            if !worth_trying(size, sound.ok(), self.base.united.is_some()) {
-                continue;
-            }
-            let name = format!("try {} (quad size x {size})", attempt + 1);
+            let Some(size) = next_size(&mut left, sound.ok(), self.base.united.is_some()) else {
+                break;
+            };
+            attempt += 1;
+            let name = format!("try {attempt} (quad size x {size})");
             match self.one(size) {
                 Ok((score, shape)) if score.good() => return Ok((score, shape)),
                 Ok((score, shape)) => {
@@ -248,6 +251,15 @@ impl Workshop<'_> {
         skeleton.stats = skeleton::stats(&skeleton.skeleton);
         Ok(skeleton)
     }
+}
+
+/// Takes the next size out of those left; after a body that cuts itself coarser quads come first: they cost less time,
+/// and give fewer faces.
+fn next_size(left: &mut Vec<f64>, sound: Option<bool>, design_part: bool) -> Option<f64> {
+    left.retain(|&size| worth_trying(size, sound, design_part));
+    let coarser = left.iter().position(|&size| size > 1.0);
+    let first = coarser.filter(|_| sound == Some(false)).unwrap_or(0);
+    (first < left.len()).then(|| left.remove(first))
 }
 
 /// Whether a body with quads of `size` may be better than the best so far, which is `sound` or is none.
@@ -385,6 +397,17 @@ pub(super) fn surface(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_body_that_cut_itself_was_tried_with_finer_quads_before_coarser_ones() {
+        let mut left = vec![1.0, 0.8, 1.3, 0.6];
+        assert_eq!(next_size(&mut left, None, false), Some(1.0));
+        assert_eq!(next_size(&mut left, Some(false), false), Some(1.3));
+        assert_eq!(next_size(&mut left, Some(true), false), Some(0.8));
+        assert_eq!(next_size(&mut left, Some(true), false), None);
+        assert_eq!(next_size(&mut vec![0.8, 1.3], Some(true), false), Some(0.8));
+        assert_eq!(next_size(&mut vec![0.8, 1.3], Some(false), true), Some(0.8));
+    }
 
     #[test]
     fn slightly_finer_quads_are_for_distance_and_coarser_ones_for_crossings() {
