@@ -154,7 +154,14 @@ fn freezing_without_data_or_sand_and_moulds_without_undercut_are_refused() {
 fn a_proposal_with_an_undercut_is_filled_before_its_skeleton_is_made() {
     // Along x the hole of the plate lies between material.
     let folder = tempfile::tempdir().expect("a folder");
-    let args = ["--draw", "1,0,0", "--set", "mould.repair=fill"];
+    let args = [
+        "--draw",
+        "1,0,0",
+        "--set",
+        "mould.repair=fill",
+        "--recognise",
+        "off",
+    ];
     let run = run(folder.path(), &args);
     assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
     let report = run.report();

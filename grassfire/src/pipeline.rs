@@ -302,7 +302,8 @@ fn rebuild(
         solid.faces_deviation = shape.faces_deviation;
     }
     record.report.non_design = part.non_design.clone();
-    let feeders = feeding::poured(record, part.volume);
+    let added = remeshed.solid.volume() - original.solid.volume();
+    let feeders = feeding::poured(record, part.volume, added);
     record.report.refused = record.stage("write", || {
         let files = exchange::Files {
             job,

@@ -62,10 +62,6 @@ impl<'a> Site<'a> {
             }
             self.must_grow = false;
         }
-        let added = grown.solid.solid.volume() - self.remeshed.solid.volume();
-        if let Some(block) = &mut self.record.report.feed {
-            block.added_volume = added;
-        }
         self.remeshed = &grown.solid;
         self.build()
     }

@@ -274,9 +274,13 @@ pub(super) fn fed(
     let growth = fed.radii.iter().zip(&before.radii).map(|(a, b)| a - b);
     let growth: Vec<f64> = growth.collect();
     let most = growth.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+    if most <= 0.0 {
+        tell_report(record, &fed, options, first);
+        return Ok((shape, Ok(None)));
+    }
     let (grown, why) = record.stage("feed", || {
         let target = follow::target(base, &shape, &growth);
-        let grown = follow::reference(&target, &whole.field, bodies, options, &quiet)?;
+        let grown = follow::reference(&target, whole, &shape, &growth, bodies, options, &quiet)?;
         Ok::<_, StageError>(if follow::same_topology(&grown, whole) {
             (Some(grown), CUTS)
         } else {
@@ -291,17 +295,10 @@ pub(super) fn fed(
             })?
             .map(|edited| (edited, grown)),
     };
-    let feed = &mut record.report.feed;
-    let block = feed.get_or_insert_with(|| block(&fed, options));
-    block.rules_after = fed.rules;
-    if first {
-        block.rules = fed.rules;
-        block.violations_before = fed.violations_before;
-        block.added_volume_skeleton = fed.added_volume;
-    }
+    let told = tell_report(record, &fed, options, first);
     let Some((edited, grown)) = edited else {
-        block.violations = fed.violations_before;
-        block.shortfall = most;
+        told.violations = fed.violations_before;
+        told.shortfall = most;
         return Ok((
             shape,
             Err(StageError::Growth {
@@ -312,10 +309,27 @@ pub(super) fn fed(
             }),
         ));
     };
-    block.violations = fed.violations;
-    block.shortfall = 0.0;
-    block.added_volume += grown.solid.volume() - whole.solid.volume();
     Ok((edited, Ok(Some(grown))))
+}
+
+/// Puts what the body's own skeleton says into the report, as if its radii can be had.
+fn tell_report<'a>(
+    record: &'a mut Record,
+    fed: &Fed,
+    options: &ReconstructOptions,
+    first: bool,
+) -> &'a mut FeedBlock {
+    let feed = &mut record.report.feed;
+    let told = feed.get_or_insert_with(|| block(fed, options));
+    told.rules_after = fed.rules;
+    told.violations = fed.violations;
+    told.shortfall = 0.0;
+    if first {
+        told.rules = fed.rules;
+        told.violations_before = fed.violations_before;
+        told.added_volume_skeleton = fed.added_volume;
+    }
+    told
 }
 
 /// Why a body cannot grow.
@@ -378,11 +392,12 @@ pub(super) fn prove(
     Ok(())
 }
 
-/// The feeders of the report, whose yield becomes that of the finished part of `volume` mm3.
-pub(super) fn poured(record: &mut Record, volume: f64) -> Vec<FeederBlock> {
+/// The feeders of the report; its yield becomes that of the finished part of `volume`, and what was added `added`, mm3.
+pub(super) fn poured(record: &mut Record, volume: f64, added: f64) -> Vec<FeederBlock> {
     let Some(block) = &mut record.report.feed else {
         return Vec::new();
     };
+    block.added_volume = added;
     let feeders: f64 = block.zones.iter().map(|zone| zone.volume).sum();
     block.casting_yield = volume / (volume + feeders);
     block.zones.clone()

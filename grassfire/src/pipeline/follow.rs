@@ -9,7 +9,6 @@ use super::feeding::{keep_free, solid_of};
 use super::shape::{Base, Shape};
 use crate::edit::{apply_radii, cells_of, grow};
 use crate::fit::{FitOptions, fit};
-use crate::mesh::{Bvh, Winding};
 use crate::monitor::Monitor;
 use crate::remesh::Remeshed;
 use crate::skeleton;
@@ -20,8 +19,6 @@ use crate::voxel::VoxelGrid;
 const STEP: f64 = 4.0;
 /// Most steps.
 const MOST_STEPS: usize = 4;
-/// The proposal's copy of a body's walls lies within so many voxels of them.
-const SKIN: f64 = 1.0;
 
 /// The field that bodies are fitted to, moved by the change of the radii of the shape's skeleton.
 pub(super) fn target(base: &Base, shape: &Shape, growth: &[f64]) -> VoxelGrid<f32> {
@@ -95,47 +92,35 @@ fn fitted(
     })
 }
 
-/// The whole proposal with its design part as in `target`: what the finished part is measured against.
+/// The whole proposal with the change of the radii of the shape's skeleton: what the finished part is measured against.
 ///
-/// Of `whole` only what belongs to the bodies, with a skin, is kept; the free lengths of their bores stay free.
+/// What has thinned of `whole`, and the grown `target` beside: so nothing comes off the bodies that were cut out of the target.
+/// The free lengths of their bores stay free.
 ///
 /// # Errors
 /// As [`solid_of`].
 pub(super) fn reference(
     target: &VoxelGrid<f32>,
-    whole: &VoxelGrid<f32>,
+    whole: &Remeshed,
+    shape: &Shape,
+    growth: &[f64],
     bodies: &Bodies,
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Remeshed, StageError> {
-    let mut field = target.clone();
-    let bosses = &bodies.bosses;
-    if let Some((lo, hi)) = bosses.surface.bounds() {
-        let skin = SKIN * field.spacing;
-        let bvh = Bvh::new(&bosses.surface);
-        let winding = Winding::new(&bvh);
-        let value = |(v, &own): (usize, &f32)| {
-            let [i, j, k] = target.ijk(v);
-            let p = target.centre(i, j, k);
-            let near = (0..3).all(|a| lo[a] - skin < p[a] && p[a] < hi[a] + skin);
-            let before = whole.sample(&p);
-            if !near || before <= f64::from(own) {
-                return own;
-            }
-            let distance = bvh
-                .nearest(&p, f64::INFINITY)
-                .map_or(f64::INFINITY, |n| n.distance);
-            let depth = if winding.at(&p) > 0.5 {
-                distance
-            } else {
-                -distance
-            };
-            own.max(before.min(depth + skin) as f32)
-        };
-        let values = target.values.par_iter().enumerate().map(value).collect();
-        field.values = values;
-    }
-    keep_free(&mut field, &bosses.free);
+    let thinning: Vec<f64> = growth.iter().map(|g| g.min(0.0)).collect();
+    let cells = cells_of(&shape.skeleton.skeleton);
+    let thinned = grow(&whole.field, whole.solid.mesh(), &cells, &thinning);
+    let value = |(v, &grown): (usize, &f32)| {
+        let [i, j, k] = target.ijk(v);
+        grown.max(thinned.sample(&target.centre(i, j, k)) as f32)
+    };
+    let values = target.values.par_iter().enumerate().map(value).collect();
+    let mut field = VoxelGrid {
+        values,
+        ..target.clone()
+    };
+    keep_free(&mut field, &bodies.bosses.free);
     Ok(solid_of(field, bodies, options, monitor)?)
 }
 

@@ -29,7 +29,7 @@ pub struct FeedBlock {
     pub violations: usize,
     /// Largest radius that is still missing, mm.
     pub shortfall: f64,
-    /// Metal added to the proposal and the body, mm3.
+    /// Metal added to the proposal, mm3.
     pub added_volume: f64,
     /// The same as the skeleton counts it, mm3.
     pub added_volume_skeleton: f64,
