@@ -68,9 +68,9 @@ fn sections_grow_and_the_part_is_measured_against_the_grown_proposal() {
     assert!(number(&report, "/feed/added_volume") > 100.0);
     let off = number(&report, "/volume/relative_difference");
     assert!(off.abs() < 0.02, "{off}");
-    let [before, after] =
-        ["falling_before", "falling"].map(|key| number(&report, &format!("/feed/{key}/falling")));
-    assert!(after <= before, "{before} {after}");
+    // On a plate nothing falls before; afterwards no more than corners and the voxels' noise do.
+    let after = number(&report, "/feed/falling/falling");
+    assert!(after < 0.05, "{after}");
     #[cfg(feature = "occt")]
     {
         let text = String::from_utf8(run.file("casting.step")).expect("text");
@@ -169,6 +169,8 @@ fn a_proposal_with_an_undercut_is_filled_before_its_skeleton_is_made() {
     assert_eq!(number(&report, "/mould/multiple_lines"), 0.0);
     assert!(number(&report, "/volume/solid") > 0.98 * SIDE * SIDE * THICK);
     assert_eq!(report["topology"]["solid"]["b1"], 0);
+    // Faces along the draw waver by less than a tenth of a voxel; the hole was an undercut of its whole volume.
     let left = number(&report, "/mould/undercut_volume");
-    assert!(left < 0.01 * SIDE * SIDE * THICK, "{left}");
+    let hole = std::f64::consts::PI * HOLE * HOLE * THICK;
+    assert!(left < 0.1 * hole, "{left}");
 }

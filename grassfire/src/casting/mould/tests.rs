@@ -191,7 +191,8 @@ fn a_core_keeps_its_undercut_open() {
         repaired.volume[1]
     );
     let again = look(&repaired.mesh, &along([0.0, 0.0, 1.0]));
-    assert_eq!(again.undercuts.len(), 1);
+    let off = again.undercut_volume / (13.0 * 24.0 * 60.0) - 1.0;
+    assert!(off.abs() < 0.1, "{off}");
     assert!(again.undercuts[0].place.y > 5.0);
     let nowhere = MouldOptions {
         cores: vec![[30.0, 80.0, 16.0]],
