@@ -74,7 +74,7 @@ fn sections_grow_and_the_part_is_measured_against_the_grown_proposal() {
     #[cfg(feature = "occt")]
     {
         let text = String::from_utf8(run.file("casting.step")).expect("text");
-        assert_eq!(text.matches("=MANIFOLD_SOLID_BREP(").count(), 3);
+        assert_eq!(text.matches("MANIFOLD_SOLID_BREP(").count(), 3);
         assert!(text.contains("'feeder 1'") && text.contains("'neck 1'"));
         let yields = number(&report, "/feed/casting_yield");
         let feeder = number(&report, "/feed/zones/0/volume");
