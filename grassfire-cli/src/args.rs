@@ -298,6 +298,8 @@ pub enum FileFormat {
     /// part.3mf: closed triangles with unit and names
     #[value(name = "3mf")]
     ThreeMf,
+    /// casting.step: the part with its feeders and their necks as bodies (needs --feeder)
+    Casting,
     /// pieces/: the fitted body and each non-design body as STEP, for tools/freecad_tree.py
     Pieces,
 }

@@ -107,6 +107,7 @@ fn formats(asked: &[FileFormat]) -> String {
             FileFormat::Brep => Format::Brep,
             FileFormat::Iges => Format::Iges,
             FileFormat::ThreeMf => Format::ThreeMf,
+            FileFormat::Casting => Format::Casting,
             FileFormat::Pieces => Format::Pieces,
         };
         format!("{:?}", format.name())

@@ -195,11 +195,12 @@ fn casting(report: &Report) -> Vec<(&'static str, String)> {
     let mut lines = Vec::new();
     if let Some(block) = &report.feed {
         let text = format!(
-            "growth {}, {} of {} rules broken before, {} after, {:+.0} mm3",
+            "growth {}, {} of {} rules broken before, {} of {} after, {:+.0} mm3",
             block.growth,
             block.violations_before,
             block.rules,
             block.violations,
+            block.rules_after,
             block.added_volume
         );
         lines.push(("feeding", text));

@@ -105,7 +105,7 @@ fn reconstruct_help_is_complete() {
           --iso <VALUE>          Density at which material begins (read.threshold)
           --format <FORMAT>      Files to write besides part.step and part.stl; may be repeated or a
                                  comma list (files.formats) [possible values: step, brep, iges, 3mf,
-                                 pieces]
+                                 casting, pieces]
           --feeder <X,Y,Z>       Where a feeder stands, mm: sections grow towards it; may be repeated
                                  (feed.feeders)
           --growth <G>           How much sections grow towards the feeders, radius a length

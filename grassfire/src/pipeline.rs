@@ -13,6 +13,7 @@ mod error;
 mod exchange;
 mod feeding;
 mod fewest;
+mod follow;
 mod illustrate;
 mod inputs;
 mod measure;
@@ -154,7 +155,7 @@ pub struct Outcome {
 /// 1. Reads the proposal and the non-design bodies; repairs the mesh; recognises bores and bosses in it.
 /// 2. Remeshes it on voxels to a closed solid and removes topological noise.
 /// 3. Computes wall thickness (poles).
-/// 4. With feeders, lets the proposal's sections grow towards them.
+/// 4. With a draw direction and a repair, takes undercuts away; with feeders, lets the proposal's sections grow towards them.
 /// 5. Cuts the non-design bodies out; steps 6 to 9 are done with what is left, and once more with the whole proposal when
 ///    that does not give a valid union.
 /// 6. Computes the pruned medial axis; builds the quad skeleton (or reads the given one), maps and smooths its radii.
@@ -236,6 +237,10 @@ fn rebuild(
         inputs::remesh(&proposal, &bodies, options, monitor)
     })?;
     record.report.remesh = Some(measure::remesh_block(&remeshed));
+    let remeshed = match casting::drawn_out(record, &remeshed, &bodies, options, monitor)? {
+        Some(repaired) => repaired,
+        None => remeshed,
+    };
     let placed;
     let options = if options.feed.feeders.is_empty() {
         options
@@ -259,27 +264,36 @@ fn rebuild(
         Some(_) => None,
         None => feeding::edit(record, &original, &bodies, options, monitor)?,
     };
-    let remeshed = fed.as_ref().unwrap_or(&original);
-    if fed.is_some() || !options.edits.is_empty() {
-        record.stage("write", || {
-            delivery.stl("edited.stl", remeshed.solid.mesh())
-        })?;
-    }
     let mut site = Site {
         record,
-        remeshed,
+        remeshed: &original,
         bodies: &mut bodies,
         drawn: drawn.as_ref(),
         delivery: &delivery,
         options,
         monitor,
+        must_grow: false,
+        grown: None,
+    };
+    let made = match &fed {
+        Some(grown) => site.build_grown(grown)?,
+        None => site.build()?,
     };
     let Made {
         axis,
         shape,
         part,
         distance,
-    } = site.build()?;
+    } = made;
+    let grown_before = !std::ptr::eq(site.remeshed, &original);
+    let grown = site.grown.take();
+    let before = fed.as_ref().filter(|_| grown_before).map(|f| &f.solid);
+    let remeshed = grown.as_ref().or(before).unwrap_or(&original);
+    if !std::ptr::eq(remeshed, &original) || !options.edits.is_empty() {
+        record.stage("write", || {
+            delivery.stl("edited.stl", remeshed.solid.mesh())
+        })?;
+    }
     if part.non_design.is_empty() {
         recognise::left_out(&mut record.report.candidates);
     }
@@ -288,6 +302,8 @@ fn rebuild(
         solid.faces_deviation = shape.faces_deviation;
     }
     record.report.non_design = part.non_design.clone();
+    let added = remeshed.solid.volume() - original.solid.volume();
+    let feeders = feeding::poured(record, part.volume, added);
     record.report.refused = record.stage("write", || {
         let files = exchange::Files {
             job,
@@ -296,6 +312,7 @@ fn rebuild(
             bodies: &bodies,
             #[cfg(feature = "occt")]
             voxel: remeshed.field.spacing,
+            feeders: &feeders,
             delivery: &delivery,
         };
         files.write(monitor)

@@ -3,7 +3,7 @@
 //! 1. [`read`] (STEP) or [`from_mesh`] make exact [`NonDesignBody`]s and find their bores.
 //! 2. [`build`] makes the body's B-rep directly (shared edges, exact pcurves, no sewing), fuses the non-design bodies with
 //!    their bores filled, cuts the bores last, and checks every step with volumes that do not come from the CAD kernel.
-//! 3. [`write_step`], [`write_brep`], [`write_iges`], [`write_pieces`] and [`tessellate`] give the files.
+//! 3. [`write_step`], [`write_brep`], [`write_iges`], [`write_pieces`], [`write_casting`] and [`tessellate`] give the files.
 //!
 //! Without the feature `occt` only the options, the error and the recognition of surfaces in meshes ([`primitives`]) are here.
 
@@ -15,6 +15,8 @@ pub mod primitives;
 mod bores;
 #[cfg(feature = "occt")]
 mod build;
+#[cfg(feature = "occt")]
+mod casting;
 #[cfg(feature = "occt")]
 mod inspect;
 #[cfg(feature = "occt")]
@@ -45,6 +47,7 @@ pub use options::{CadOptions, NonDesignOptions, StepOptions};
 pub use {
     bores::Bore,
     build::{CadSolid, FaceSource, Joined, build, finish, join},
+    casting::{FeederBody, write_casting},
     inspect::NonDesignResult,
     non_design::{
         DesignSpace, NonDesignBody, Rebuilt, SpaceBore, from_boss, from_mesh, from_shape, read,

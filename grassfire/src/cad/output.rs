@@ -103,7 +103,7 @@ pub fn write_pieces(
 }
 
 /// The kernel writes to a folder of its own; what it wrote goes to `path` whole or not at all.
-fn by_kernel(
+pub(super) fn by_kernel(
     path: &Path,
     name: &str,
     write: impl FnOnce(&Path) -> Result<(), OcctError>,
@@ -141,7 +141,7 @@ fn compare(solid: &CadSolid, back: &Shape, limit: f64) -> Result<(), OcctError> 
     Ok(())
 }
 
-fn texts(solid: &CadSolid, options: &StepOptions) -> Result<StepTexts, CadError> {
+pub(super) fn texts(solid: &CadSolid, options: &StepOptions) -> Result<StepTexts, CadError> {
     let product = options.product();
     let (faces, colors) = names::faces(solid)?;
     let state = if solid.valid {

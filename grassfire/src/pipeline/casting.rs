@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::bodies::Bodies;
 use super::deliver::Delivery;
 use super::error::{PipelineError, StageError};
 use super::record::Record;
@@ -9,11 +10,12 @@ use super::{Outcome, ReconstructOptions, inputs};
 use crate::Vec3;
 #[cfg(feature = "occt")]
 use crate::cad;
-use crate::casting::mould::{Mould, MouldOptions, mould};
+use crate::casting::mould::{self, Mould, MouldOptions, Repair, dexels, mould, parting};
 use crate::casting::solidify::{Cell, HotSpot, Solidification, solidify};
 use crate::io::{self, Input};
 use crate::mesh::{TriMesh, repair};
 use crate::monitor::Monitor;
+use crate::remesh::{RemeshOptions, Remeshed, remesh};
 use crate::report::render::{ColourMap, Legend, section::Section, section::section};
 use crate::report::{
     FindingBlock, HotSpotBlock, MouldBlock, Picture, ReportError, ReportOptions, SolidifyBlock,
@@ -116,17 +118,72 @@ pub fn mould_solid(job: &SolidJob, monitor: &Monitor) -> Result<Outcome, Pipelin
     })
 }
 
-/// Looks at the mould of a finished part when a draw direction is given.
+/// The proposal without undercuts; none when no draw direction or no repair is asked for.
+///
+/// [`mould::repair`] on the proposal's voxels; cores make the bores of the non-design bodies. The topology changes here and is known
+/// to all later stages.
+///
+/// # Errors
+/// Those of the options, of the repair and of the remesh.
+pub(super) fn drawn_out(
+    record: &mut Record,
+    from: &Remeshed,
+    bodies: &Bodies,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Option<Remeshed>, PipelineError> {
+    let asked = &options.mould;
+    let Some(draw) = asked.draw.filter(|_| asked.repairs()) else {
+        return Ok(None);
+    };
+    let cell = from.field.spacing;
+    let (repaired, solid) = record.stage("mould", || {
+        mould::check(asked)?;
+        let (mesh, draw) = (from.solid.mesh(), Vec3::from(draw).normalize());
+        let (_, height) = parting(&dexels(mesh, &draw, asked.lines));
+        let mut asked = asked.repair_options(height, cell);
+        asked.bores.clone_from(&bodies.bosses.free);
+        let repaired = mould::repair(mesh, &draw, &asked, monitor)?;
+        let mut on_grid = RemeshOptions {
+            voxel: Some(cell),
+            ..options.remesh.clone()
+        };
+        on_grid.keep_open.extend(&bodies.bosses.free);
+        let solid = remesh(&repaired.mesh, &on_grid, monitor)?;
+        Ok::<_, StageError>((repaired, solid))
+    })?;
+    record.report.mould = Some(MouldBlock {
+        repaired_volume: Some(repaired.volume[1]),
+        multiple_lines_before: Some(repaired.multiple[0]),
+        multiple_lines: Some(repaired.multiple[1]),
+        ..MouldBlock::default()
+    });
+    Ok(Some(solid))
+}
+
+/// Looks at the mould of a finished part when a draw direction is given; what was repaired before stays in the report.
 pub(super) fn mould_of(
     record: &mut Record,
     part: &TriMesh,
     options: &MouldOptions,
     monitor: &Monitor,
 ) -> Result<(), PipelineError> {
-    if options.draw.is_some() {
-        let found = record.stage("mould", || mould(part, options, monitor))?;
-        record.report.mould = Some(mould_block(&found));
+    if options.draw.is_none() {
+        return Ok(());
     }
+    let options = MouldOptions {
+        repair: Repair::Off,
+        repair_draft: 0.0,
+        ..options.clone()
+    };
+    let found = record.stage("mould", || mould(part, &options, monitor))?;
+    let before = record.report.mould.take().unwrap_or_default();
+    record.report.mould = Some(MouldBlock {
+        repaired_volume: before.repaired_volume,
+        multiple_lines_before: before.multiple_lines_before,
+        multiple_lines: before.multiple_lines,
+        ..mould_block(&found)
+    });
     Ok(())
 }
 

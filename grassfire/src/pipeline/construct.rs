@@ -3,7 +3,7 @@
 use super::bodies::Bodies;
 use super::deliver::Delivery;
 use super::error::{PipelineError, StageError};
-use super::feeding::fed;
+use super::feeding::{Grown, fed};
 use super::fewest::fewest;
 use super::record::Record;
 use super::shape::{self, Base, Shape};
@@ -27,6 +27,10 @@ pub(super) struct Site<'a> {
     pub(super) delivery: &'a Delivery,
     pub(super) options: &'a ReconstructOptions,
     pub(super) monitor: &'a Monitor,
+    /// A part whose body cannot grow as feeding asks is given up.
+    pub(super) must_grow: bool,
+    /// The proposal with the growth of the body, which the part is measured against then.
+    pub(super) grown: Option<Remeshed>,
 }
 
 /// The part with the stages before it.
@@ -38,7 +42,35 @@ pub(super) struct Made {
     pub(super) distance: Distance,
 }
 
-impl Site<'_> {
+impl<'a> Site<'a> {
+    /// Makes the part with sections that grow towards the feeders.
+    ///
+    /// 1. Where no gap closes, the body is made of the proposal and then grows on its own skeleton: so it has the least metal.
+    /// 2. Where that is not possible, it is made of the proposal that grew before.
+    pub(super) fn build_grown(&mut self, grown: &'a Grown) -> Result<Made, PipelineError> {
+        if grown.same_topology {
+            self.must_grow = true;
+            match self.build() {
+                Err(error) if matches!(error.source, StageError::Growth { .. }) => {
+                    let text = format!(
+                        "{}; the proposal grows before its skeleton is made instead",
+                        error.source
+                    );
+                    self.monitor.warn("feed", text);
+                }
+                made => return made,
+            }
+            self.must_grow = false;
+        }
+        self.remeshed = &grown.solid;
+        self.build()
+    }
+
+    /// What the part is measured against.
+    pub(super) fn proposal(&self) -> &Remeshed {
+        self.grown.as_ref().unwrap_or(self.remeshed)
+    }
+
     /// Makes the part.
     ///
     /// 1. Cuts the non-design bodies out of the proposal, makes the design part, unites it with them.
@@ -49,7 +81,11 @@ impl Site<'_> {
         match self.without_bodies() {
             Ok(Some(made)) => return Ok(made),
             Ok(None) => {}
-            Err(error) if error.is_cancelled() => return Err(error),
+            Err(error)
+                if error.is_cancelled() || matches!(error.source, StageError::Growth { .. }) =>
+            {
+                return Err(error);
+            }
             Err(error) => self.give_up(&format!("{} failed: {}", error.stage, error.source)),
         }
         self.as_a_whole()
@@ -128,15 +164,16 @@ impl Site<'_> {
     }
 
     fn distance(&mut self, part: &Part) -> Result<Distance, PipelineError> {
-        let (remeshed, bodies, monitor) = (self.remeshed, &*self.bodies, self.monitor);
+        let proposal = self.grown.as_ref().unwrap_or(self.remeshed);
+        let (bodies, monitor) = (&*self.bodies, self.monitor);
         self.record.stage("measure", || {
-            measure::distance(remeshed, part, bodies, monitor)
+            measure::distance(proposal, part, bodies, monitor)
         })
     }
 
     /// By how much the part misses the limits for distance and volume, when it does.
     fn too_far(&self, part: &Part, distance: &Distance) -> Option<String> {
-        let (remeshed, limits) = (self.remeshed, &self.options.report.limits);
+        let (remeshed, limits) = (self.proposal(), &self.options.report.limits);
         let voxel = remeshed.field.spacing;
         let volume = measure::volume_block(remeshed, part)
             .relative_difference
@@ -213,12 +250,33 @@ impl Site<'_> {
         })?;
         self.record.stage("write", || delivery.medial(&axis.mesh))?;
         let shape = shape::shape(self.record, &axis, base, self.drawn, options, monitor)?;
-        let shape = fed(self.record, shape, base, self.bodies, options, monitor)?;
+        let shape = self.fed(shape, base)?;
         let voxel = base.remeshed.field.spacing;
         let shape = fewest(self.record, shape, voxel, options, monitor)?;
         self.record
             .stage("write", || delivery.skeleton(&shape.skeleton.skeleton))?;
         Ok((axis, shape))
+    }
+
+    /// The shape with sections that grow towards the feeders, as far as its body can follow.
+    fn fed(&mut self, shape: Shape, base: &Base) -> Result<Shape, PipelineError> {
+        let (whole, options) = (self.remeshed, self.options);
+        let first = self.must_grow || self.drawn.is_some();
+        let (shape, followed) = fed(self.record, shape, base, whole, self.bodies, options, first)?;
+        self.grown = match followed {
+            Ok(grown) => grown,
+            Err(source) if self.must_grow => {
+                return Err(PipelineError {
+                    stage: "feed",
+                    source,
+                });
+            }
+            Err(why) => {
+                self.monitor.warn("feed", why.to_string());
+                None
+            }
+        };
+        Ok(shape)
     }
 
     pub(super) fn surface(&mut self, shape: &Shape) -> Result<shape::Surface, PipelineError> {

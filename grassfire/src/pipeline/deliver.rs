@@ -20,6 +20,7 @@ pub(super) const FILES: &[(&str, &str)] = &[
     ("part.3mf", "the solid, triangles with unit and names"),
     ("part.brep", "the solid, OpenCASCADE's own format"),
     ("part.igs", "the solid, IGES"),
+    ("casting.step", "the solid with its feeders, STEP AP242"),
     ("body.obj", "closed quad control mesh of the body"),
     ("body.stl", "limit surface of the body, triangles"),
     ("skeleton.ply", "quad skeleton with radii, editable"),

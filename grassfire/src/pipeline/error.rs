@@ -94,10 +94,21 @@ pub enum StageError {
     Unit { bodies: f64, proposal: f64 },
     #[error("{} is no STEP file; a design space must be given as STEP", path.display())]
     DesignSpace { path: PathBuf },
+    #[error(
+        "the last {most:.2} mm of growth on {broken} of {rules} edges of the skeleton are left out: {why}"
+    )]
+    Growth {
+        most: f64,
+        broken: usize,
+        rules: usize,
+        why: &'static str,
+    },
     #[error("retry.quad_sizes is empty: no quad size to try")]
     NoQuadSize,
     #[error("the format {format} cannot be written: this build has no OpenCASCADE")]
     Format { format: &'static str },
+    #[error("the format casting is the part with its feeders, and no feeder is given")]
+    NoFeeders,
     #[error(
         "files.chord is {chord} mm; {} or more wanted",
         super::exchange::MIN_CHORD
@@ -173,6 +184,8 @@ impl PipelineError {
             StageError::Chord { .. } => {
                 Some("leave it out, or give a length such as files.chord=0.02".into())
             }
+            StageError::Growth { .. } => Some("less feed.growth asks for less metal".into()),
+            StageError::NoFeeders => Some("give one with --feeder x,y,z".into()),
             StageError::Open { .. } => Some("a smaller files.chord may help".into()),
             StageError::NoQuadSize => {
                 Some("give at least one factor, such as retry.quad_sizes=[1.0]".into())

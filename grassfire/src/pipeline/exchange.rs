@@ -9,13 +9,13 @@ use super::deliver::Delivery;
 use super::error::StageError;
 use super::union::Part;
 use super::{ReconstructJob, ReconstructOptions};
-#[cfg(feature = "occt")]
-use crate::cad;
 use crate::cad::StepOptions;
+#[cfg(feature = "occt")]
+use crate::cad::{self, FeederBody};
 use crate::io::{self, ThreeMfObject, ThreeMfTexts};
 use crate::mesh::{Solid, TriMesh};
 use crate::monitor::Monitor;
-use crate::report::RefusedFile;
+use crate::report::{FeederBlock, RefusedFile};
 
 /// A file of the finished part.
 #[derive(
@@ -32,6 +32,8 @@ pub enum Format {
     /// `part.3mf`: triangles with names.
     #[serde(rename = "3mf")]
     ThreeMf,
+    /// `casting.step`: the part with its feeders and their necks as bodies of an assembly.
+    Casting,
     /// `pieces/`: the fitted body and each non-design body as STEP, from which `tools/freecad_tree.py` makes a FreeCAD file.
     Pieces,
 }
@@ -44,6 +46,7 @@ impl Format {
             Self::Brep => "brep",
             Self::Iges => "iges",
             Self::ThreeMf => "3mf",
+            Self::Casting => "casting",
             Self::Pieces => "pieces",
         }
     }
@@ -59,7 +62,7 @@ impl Format {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FileOptions {
-    /// Files besides part.step and part.stl: `brep`, `iges`, `3mf`, `pieces`.
+    /// Files besides part.step and part.stl: `brep`, `iges`, `3mf`, `casting`, `pieces`.
     pub formats: Vec<Format>,
     /// Largest distance of the triangles in part.stl and part.3mf from the solid, mm. Default a twentieth of a voxel.
     /// Without OpenCASCADE they are those of the limit surface, see `tessellate.chord`.
@@ -72,13 +75,16 @@ pub(super) const MIN_CHORD: f64 = 1e-3;
 /// Refuses what this build cannot write and chords that are no length, before anything is read.
 ///
 /// # Errors
-/// [`StageError::Format`], [`StageError::Chord`].
+/// [`StageError::Format`], [`StageError::NoFeeders`], [`StageError::Chord`].
 pub(super) fn check(options: &ReconstructOptions) -> Result<(), StageError> {
     let files = &options.files;
     if let Some(format) = files.formats.iter().find(|format| !format.available()) {
         return Err(StageError::Format {
             format: format.name(),
         });
+    }
+    if files.formats.contains(&Format::Casting) && options.feed.feeders.is_empty() {
+        return Err(StageError::NoFeeders);
     }
     match files.chord {
         Some(chord) if !(chord.is_finite() && chord >= MIN_CHORD) => {
@@ -105,6 +111,12 @@ pub(super) struct Files<'a> {
     pub(super) bodies: &'a Bodies,
     #[cfg(feature = "occt")]
     pub(super) voxel: f64,
+    /// What each feeder needs.
+    #[cfg_attr(
+        not(feature = "occt"),
+        allow(dead_code, reason = "only the kernel writes them")
+    )]
+    pub(super) feeders: &'a [FeederBlock],
     pub(super) delivery: &'a Delivery,
 }
 
@@ -171,9 +183,11 @@ impl Files<'_> {
             #[cfg(feature = "occt")]
             Format::Iges => ("part.igs", self.iges(texts)),
             #[cfg(feature = "occt")]
+            Format::Casting => ("casting.step", self.casting(texts)),
+            #[cfg(feature = "occt")]
             Format::Pieces => ("pieces", self.pieces(texts)),
             #[cfg(not(feature = "occt"))]
-            Format::Brep | Format::Iges | Format::Pieces => (
+            Format::Brep | Format::Iges | Format::Casting | Format::Pieces => (
                 format.name(),
                 Err(StageError::Format {
                     format: format.name(),
@@ -235,6 +249,25 @@ impl Files<'_> {
     fn iges(&self, texts: &StepOptions) -> Result<(), StageError> {
         let path = self.delivery.path("part.igs");
         Ok(cad::write_iges(&self.part.solid, &path, texts)?)
+    }
+
+    /// The part and the feeders that the feeding edit asks for.
+    fn casting(&self, texts: &StepOptions) -> Result<(), StageError> {
+        let body = |zone: &FeederBlock| FeederBody {
+            foot: zone.place,
+            diameter: zone.diameter,
+            neck: zone.neck,
+        };
+        let feeders: Vec<FeederBody> = self.feeders.iter().map(body).collect();
+        let path = self.delivery.path("casting.step");
+        let up = self.job.options.solidify.up;
+        Ok(cad::write_casting(
+            &self.part.solid,
+            &feeders,
+            up,
+            &path,
+            texts,
+        )?)
     }
 
     fn pieces(&self, texts: &StepOptions) -> Result<(), StageError> {

@@ -3,6 +3,7 @@
 use super::ReconstructOptions;
 use super::bodies::Bodies;
 use super::error::{PipelineError, StageError};
+use super::follow;
 use super::record::Record;
 use super::shape::{Base, Shape};
 use crate::Vec3;
@@ -10,8 +11,7 @@ use crate::casting::feed::{
     self, Contact, Fed, FeedError, FeedGraph, FeedOn, FeedOptions, Monotony, area_factor, feed,
     feed_graph, monotony,
 };
-use crate::edit::{apply_radii, cells_of, grow};
-use crate::fit::{FitOptions, fit};
+use crate::edit::{cells_of, grow};
 use crate::medial::{self, MedialMesh};
 use crate::mesh::{Bvh, TriMesh, Winding};
 use crate::monitor::Monitor;
@@ -19,7 +19,6 @@ use crate::radii;
 use crate::remesh::{Capsule, RemeshError, RemeshOptions, Remeshed, remesh, remesh_density};
 use crate::report::{FeedBlock, FeederBlock, InfeasibleBlock};
 use crate::skeleton;
-use crate::thicken::ThickenedBody;
 use crate::voxel::VoxelGrid;
 
 /// A skeleton point touches a body when the body is nearer than this many radii.
@@ -80,14 +79,21 @@ pub(super) fn placed(
     Ok(placed)
 }
 
+/// A proposal whose sections grow towards the feeders.
+pub(super) struct Grown {
+    pub(super) solid: Remeshed,
+    /// No gap closed: a body of the ungrown proposal's skeleton can grow as far.
+    pub(super) same_topology: bool,
+}
+
 /// The proposal with sections that grow towards the feeders; none when nothing is to be fed or nothing has to grow.
 ///
 /// 1. The least radii on the proposal's skeleton or medial axis ([`feed_graph`]).
 /// 2. The proposal's field moves outward by what they grew ([`grow`]); bores that stay free stay so.
 /// 3. The grown field is remeshed: where gaps close, the topology changes here and is known to all later stages.
 ///
-/// What the skeleton of the grown proposal still asks for is done on the body ([`fed`]). Growing the field again and again
-/// instead was tried: junctions swell round after round until no body of the skeleton is sound.
+/// It is for the case that the body itself cannot grow ([`fed`]); what its skeleton asks for then is done on its body.
+/// Growing the field again and again was tried: junctions swell round after round until no body of the skeleton is sound.
 ///
 /// Scaling the offsets of a finished body instead makes it cut itself wherever gaps close. The report gets what the
 /// skeleton of the proposal says before the edit.
@@ -100,16 +106,16 @@ pub(super) fn edit(
     bodies: &Bodies,
     options: &ReconstructOptions,
     monitor: &Monitor,
-) -> Result<Option<Remeshed>, PipelineError> {
+) -> Result<Option<Grown>, PipelineError> {
     if !options.feed.active() {
         return Ok(None);
     }
     let (fed, grown) = one_round(record, remeshed, bodies, options, monitor)?;
-    let added = grown
-        .as_ref()
-        .map_or(0.0, |grown| grown.solid.volume() - remeshed.solid.volume());
-    record.report.feed = Some(block(&fed, added, options));
-    Ok(grown)
+    record.report.feed = Some(block(&fed, options));
+    Ok(grown.map(|solid| Grown {
+        same_topology: follow::same_topology(&solid, remeshed),
+        solid,
+    }))
 }
 
 /// What feeding says of a solid, and the solid grown by it when that is worth while.
@@ -231,26 +237,31 @@ pub(super) fn solid_of(
     remesh_density(&density, 0.5, &on_grid, monitor)
 }
 
-/// The shape with the radii that feeding still asks for on its own skeleton; as it is when nothing is to be fed, or when
-/// the body with these radii would not be sound.
+/// The proposal with the growth of a body that followed its radii, none when nothing is to be fed; or why it could not.
+pub(super) type Followed = Result<Option<Remeshed>, StageError>;
+
+/// The shape with the radii that feeding asks for on its own skeleton, and the proposal with the same growth. With `first`
+/// nothing has grown before.
 ///
 /// 1. The least radii ([`feed`]).
-/// 2. The target of the fit moves outward by what they grew ([`grow`]), the thickened body is scaled ([`apply_radii`]).
-/// 3. The scaled body is fitted to that target, which also untangles it.
+/// 2. The proposal with this growth ([`reference`]). Where gaps close a body of the same skeleton would cut itself: then it
+///    stays as it is.
+/// 3. The body follows ([`follow`]); it stays as it is when it would not be sound.
 ///
 /// # Errors
-/// As [`feed`] and [`fit`].
+/// As [`feed`], [`follow`] and [`reference`].
 pub(super) fn fed(
     record: &mut Record,
     shape: Shape,
     base: &Base,
+    whole: &Remeshed,
     bodies: &Bodies,
     options: &ReconstructOptions,
-    monitor: &Monitor,
-) -> Result<Shape, PipelineError> {
+    first: bool,
+) -> Result<(Shape, Followed), PipelineError> {
     let feeding = &options.feed;
     if !feeding.active() {
-        return Ok(shape);
+        return Ok((shape, Ok(None)));
     }
     let before = &shape.skeleton.skeleton;
     let quiet = Monitor::default();
@@ -262,56 +273,68 @@ pub(super) fn fed(
     })?;
     let growth = fed.radii.iter().zip(&before.radii).map(|(a, b)| a - b);
     let growth: Vec<f64> = growth.collect();
-    let shortfall = growth.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
-    let (body, target) = record.stage("feed", || {
-        let surface = base.remeshed.solid.mesh();
-        let target = grow(base.target, surface, &cells_of(before), &growth);
-        let mesh = apply_radii(&shape.body.mesh, &shape.body, before, &fed.radii)?;
-        let body = ThickenedBody {
-            mesh,
-            ..shape.body.clone()
-        };
-        Ok::<_, StageError>((body, target))
-    })?;
-    let mut skeleton = shape.skeleton.clone();
-    skeleton.skeleton.radii.clone_from(&fed.radii);
-    skeleton.stats = skeleton::stats(&skeleton.skeleton);
-    let fitted = record.stage("fit", || {
-        let options = FitOptions {
-            volume: Some(base.volume(&target)),
-            ..options.fit
-        };
-        fit(&body, &skeleton.skeleton, &target, &options, &quiet)
-    })?;
-    let added = fitted.volume - shape.fitted.volume;
-    let edited = Shape {
-        skeleton,
-        body,
-        fitted,
-        ..shape.clone()
-    };
-    let sound = edited.sound();
-    if let Some(block) = &mut record.report.feed {
-        block.violations = if sound {
-            fed.violations
+    let most = growth.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+    if most <= 0.0 {
+        tell_report(record, &fed, options, first);
+        return Ok((shape, Ok(None)));
+    }
+    let (grown, why) = record.stage("feed", || {
+        let target = follow::target(base, &shape, &growth);
+        let grown = follow::reference(&target, whole, &shape, &growth, bodies, options, &quiet)?;
+        Ok::<_, StageError>(if follow::same_topology(&grown, whole) {
+            (Some(grown), CUTS)
         } else {
-            fed.violations_before
-        };
-        block.shortfall = if sound { 0.0 } else { shortfall };
-        if sound {
-            block.added_volume += added;
-        }
-    }
-    if !sound {
-        let text = format!(
-            "the last {shortfall:.2} mm of growth on {} of {} edges of the skeleton were left out: the body would cut itself",
-            fed.violations_before, fed.rules
-        );
-        monitor.warn("feed", text);
-        return Ok(shape);
-    }
-    Ok(edited)
+            (None, CLOSES)
+        })
+    })?;
+    let edited = match grown {
+        None => None,
+        Some(grown) => record
+            .stage("fit", || {
+                follow::follow(&shape, base, &fed.radii, options, &quiet)
+            })?
+            .map(|edited| (edited, grown)),
+    };
+    let told = tell_report(record, &fed, options, first);
+    let Some((edited, grown)) = edited else {
+        told.violations = fed.violations_before;
+        told.shortfall = most;
+        return Ok((
+            shape,
+            Err(StageError::Growth {
+                most,
+                broken: fed.violations_before,
+                rules: fed.rules,
+                why,
+            }),
+        ));
+    };
+    Ok((edited, Ok(Some(grown))))
 }
+
+/// Puts what the body's own skeleton says into the report, as if its radii can be had.
+fn tell_report<'a>(
+    record: &'a mut Record,
+    fed: &Fed,
+    options: &ReconstructOptions,
+    first: bool,
+) -> &'a mut FeedBlock {
+    let feed = &mut record.report.feed;
+    let told = feed.get_or_insert_with(|| block(fed, options));
+    told.rules_after = fed.rules;
+    told.violations = fed.violations;
+    told.shortfall = 0.0;
+    if first {
+        told.rules = fed.rules;
+        told.violations_before = fed.violations_before;
+        told.added_volume_skeleton = fed.added_volume;
+    }
+    told
+}
+
+/// Why a body cannot grow.
+const CUTS: &str = "the body would cut itself";
+const CLOSES: &str = "gaps would close";
 
 /// Far points whose ways to the feeders are looked at.
 const PATHS: usize = 20;
@@ -367,6 +390,17 @@ pub(super) fn prove(
         block.falling = after;
     }
     Ok(())
+}
+
+/// The feeders of the report; its yield becomes that of the finished part of `volume`, and what was added `added`, mm3.
+pub(super) fn poured(record: &mut Record, volume: f64, added: f64) -> Vec<FeederBlock> {
+    let Some(block) = &mut record.report.feed else {
+        return Vec::new();
+    };
+    block.added_volume = added;
+    let feeders: f64 = block.zones.iter().map(|zone| zone.volume).sum();
+    block.casting_yield = volume / (volume + feeders);
+    block.zones.clone()
 }
 
 /// Which points of a skeleton belong to a body.
@@ -435,7 +469,7 @@ fn contacts(
     (0..count).map(one).collect()
 }
 
-fn block(fed: &Fed, added: f64, options: &ReconstructOptions) -> FeedBlock {
+fn block(fed: &Fed, options: &ReconstructOptions) -> FeedBlock {
     let feeders = fed.zones.iter().map(|zone| FeederBlock {
         place: zone.feeder.into(),
         points: zone.points,
@@ -458,10 +492,11 @@ fn block(fed: &Fed, added: f64, options: &ReconstructOptions) -> FeedBlock {
         growth: fed.slope,
         k_area: area_factor(fed.slope),
         rules: fed.rules,
+        rules_after: fed.rules,
         violations_before: fed.violations_before,
         violations: fed.violations,
         shortfall: 0.0,
-        added_volume: added,
+        added_volume: 0.0,
         added_volume_skeleton: fed.added_volume,
         casting_yield: fed.casting_yield,
         falling_before: Monotony::default(),

@@ -23,11 +23,13 @@ pub struct FeedBlock {
     pub rules: usize,
     /// Of these, where they did not before the edit.
     pub violations_before: usize,
-    /// And after it.
+    /// Likewise of the finished body's skeleton.
+    pub rules_after: usize,
+    /// Of these, where they do not after the edit.
     pub violations: usize,
     /// Largest radius that is still missing, mm.
     pub shortfall: f64,
-    /// Metal added to the proposal and the body, mm3.
+    /// Metal added to the proposal, mm3.
     pub added_volume: f64,
     /// The same as the skeleton counts it, mm3.
     pub added_volume_skeleton: f64,
@@ -133,7 +135,7 @@ pub struct MouldBlock {
     pub wall_ratio: f64,
     /// Rules that are not met.
     pub findings: Vec<FindingBlock>,
-    /// Volume of the repaired part, mm3.
+    /// Volume of the part, or of the proposal before its skeleton was made, when its undercuts were repaired, mm3.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub repaired_volume: Option<f64>,
     /// Lines with more than one interval before the repair.
@@ -241,7 +243,7 @@ fn feed(block: &FeedBlock) -> Markup {
         dl .facts {
             div { dt { "Growth" } dd { (number(block.growth, 3)) " (area factor " (number(block.k_area, 4)) ")" } }
             div { dt { "Rules broken before" } dd { (count(block.violations_before)) " of " (count(block.rules)) } }
-            div { dt { "After" } dd { (count(block.violations)) } }
+            div { dt { "After" } dd { (count(block.violations)) " of " (count(block.rules_after)) } }
             div { dt { "Metal added" } dd { (with_unit(block.added_volume, 4, "mm³")) } }
             div { dt { "Ways to the feeder where balls shrink, before and after" } dd { (with_unit(100.0 * block.falling_before.falling, 3, "%")) ", " (with_unit(100.0 * block.falling.falling, 3, "%")) } }
             div { dt { "Casting yield" } dd { (with_unit(100.0 * block.casting_yield, 3, "%")) } }
@@ -311,7 +313,8 @@ fn mould(block: &MouldBlock) -> Markup {
             div { dt { "Least draft" } dd { (with_unit(block.min_draft, 3, "°")) } }
             @if let Some(wall) = block.min_wall { div { dt { "Least wall" } dd { (with_unit(wall, 3, "mm")) } } }
             div { dt { "Thick to thin walls" } dd { (number(block.wall_ratio, 3)) } }
-            @if let Some(volume) = block.repaired_volume { div { dt { "Volume without undercuts" } dd { (with_unit(volume, 5, "mm³")) } } }
+            @if let Some(volume) = block.repaired_volume { div { dt { "Volume when repaired" } dd { (with_unit(volume, 5, "mm³")) } } }
+            @if let (Some(before), Some(after)) = (block.multiple_lines_before, block.multiple_lines) { div { dt { "Lines with hidden gaps, before and after the repair" } dd { (count(before)) ", " (count(after)) } } }
         }
         @if !block.findings.is_empty() {
             div .scroll { table {

@@ -1,5 +1,6 @@
 //! The mould: undercuts, parting, draft, walls, the best draw direction, and repair.
 
+mod cores;
 pub mod dexels;
 pub mod directions;
 pub mod draft;
@@ -52,6 +53,8 @@ pub struct MouldOptions {
     pub fill_cost: f64,
     /// Draft that the repair adds, degrees.
     pub repair_draft: f64,
+    /// A place in each undercut that a core makes, mm: a repair leaves it open.
+    pub cores: Vec<[f64; 3]>,
     /// Voxel of the repair, mm; without it the pitch of the lines.
     pub cell: Option<f64>,
     /// Limits of the foundry.
@@ -70,8 +73,29 @@ impl Default for MouldOptions {
             repair: Repair::Off,
             fill_cost: 0.5,
             repair_draft: 0.0,
+            cores: Vec::new(),
             cell: None,
             rules: Rules::default(),
+        }
+    }
+}
+
+impl MouldOptions {
+    /// A repair is asked for.
+    pub fn repairs(&self) -> bool {
+        self.repair != Repair::Off || self.repair_draft > 0.0
+    }
+
+    /// The repair that is asked for, with the parting plane at a height along the draw direction and voxels of `cell`, mm.
+    pub fn repair_options(&self, parting: f64, cell: f64) -> RepairOptions {
+        RepairOptions {
+            kind: self.repair,
+            fill_cost: self.fill_cost,
+            draft: self.repair_draft,
+            parting,
+            cell,
+            cores: self.cores.iter().map(|p| Vec3::from(*p)).collect(),
+            bores: Vec::new(),
         }
     }
 }
@@ -136,6 +160,12 @@ pub enum MouldError {
     /// Nothing there.
     #[error("the part has no surface")]
     Empty,
+    /// A core is named where nothing is undercut.
+    #[error("a core of mould.cores is {distance:.1} mm from the nearest undercut of the part")]
+    Core {
+        /// Distance to the nearest undercut, mm.
+        distance: f64,
+    },
     /// The part could not be put on a grid for its repair.
     #[error("the part cannot be put on a grid of {cell} mm")]
     Grid {
@@ -154,6 +184,9 @@ impl MouldError {
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Option { .. } => Some("`grassfire schema` lists all options".to_owned()),
+            Self::Core { .. } => {
+                Some("the report of `grassfire mould` lists the undercuts with their places".into())
+            }
             Self::Grid { source, .. } => source.hint(),
             Self::Empty | Self::Cancelled(_) => None,
         }
@@ -232,16 +265,10 @@ pub fn mould(
         ..Mould::default()
     };
     out.findings = findings(&out, mesh, pick(options.exempt), pick(0.95), rules);
-    if options.repair != Repair::Off || options.repair_draft > 0.0 {
+    if options.repairs() {
         monitor.step(STAGE, "repair", 0.8)?;
         let cell = options.cell.unwrap_or(lattice.pitch);
-        let repair_options = RepairOptions {
-            kind: options.repair,
-            fill_cost: options.fill_cost,
-            draft: options.repair_draft,
-            parting,
-            cell,
-        };
+        let repair_options = options.repair_options(parting, cell);
         out.repaired = Some(repair(mesh, &draw, &repair_options, monitor)?);
     }
     Ok(out)
@@ -302,7 +329,11 @@ fn findings(
     out
 }
 
-fn check(options: &MouldOptions) -> Result<(), MouldError> {
+/// Checks the options.
+///
+/// # Errors
+/// [`MouldError::Option`].
+pub fn check(options: &MouldOptions) -> Result<(), MouldError> {
     let range = |name, value: f64, lo: f64, hi: f64, allowed| {
         if value.is_finite() && value >= lo && value <= hi {
             Ok(())
@@ -328,6 +359,9 @@ fn check(options: &MouldOptions) -> Result<(), MouldError> {
     )?;
     range("exempt", options.exempt, 0.0, 0.5, "0 to 0.5")?;
     range("fill_cost", options.fill_cost, 0.0, 1e6, "0 or more")?;
+    for place in options.cores.iter().flatten() {
+        range("cores", *place, -1e9, 1e9, "places in mm")?;
+    }
     range("repair_draft", options.repair_draft, 0.0, 30.0, "0 to 30")?;
     range(
         "cell",

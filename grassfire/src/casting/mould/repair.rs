@@ -4,11 +4,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::MouldError;
+use super::cores::cored;
 use super::dexels::axes;
 use crate::Vec3;
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
-use crate::remesh::{RemeshError, RemeshOptions, remesh, remesh_density};
+use crate::remesh::{Capsule, RemeshError, RemeshOptions, remesh, remesh_density};
 use crate::voxel::VoxelGrid;
 
 /// What is done about undercuts.
@@ -26,7 +27,7 @@ pub enum Repair {
 }
 
 /// How undercuts are removed.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RepairOptions {
     /// What is done.
     pub kind: Repair,
@@ -38,6 +39,10 @@ pub struct RepairOptions {
     pub parting: f64,
     /// Edge of a voxel, mm.
     pub cell: f64,
+    /// A place in each undercut that a core makes, mm: it stays open.
+    pub cores: Vec<Vec3>,
+    /// Bores that cores make likewise.
+    pub bores: Vec<Capsule>,
 }
 
 /// A part without undercuts.
@@ -47,13 +52,14 @@ pub struct Repaired {
     pub mesh: TriMesh,
     /// Volume before and after on the same grid, mm3.
     pub volume: [f64; 2],
-    /// Lines with more than one interval, before and after, on the voxels.
+    /// Lines with more than one interval, before and after, on the voxels; cores count as material.
     pub multiple: [usize; 2],
 }
 
 /// Removes undercuts along the unit vector `draw`.
 ///
 /// 1. The part is turned so that the draw direction is z and measured on voxels of `cell` mm (signed distances).
+///    What cores make counts as material until the end.
 /// 2. [`Repair::Fill`]: every value becomes at least the smaller of the largest values above and below it on its line. All
 ///    level sets of the result are single intervals, so the surface between voxels is, too.
 /// 3. [`Repair::Keep`]: on every line the interval with the largest sum of +1 a solid and `-cost` an empty voxel (Kadane's
@@ -63,7 +69,7 @@ pub struct Repaired {
 /// 5. The surface is extracted and turned back.
 ///
 /// # Errors
-/// [`MouldError::Grid`] when the part cannot be put on the grid; cancelled.
+/// [`MouldError::Grid`] when the part cannot be put on the grid, [`MouldError::Core`] for a core without an undercut; cancelled.
 pub fn repair(
     mesh: &TriMesh,
     draw: &Vec3,
@@ -71,9 +77,8 @@ pub fn repair(
     monitor: &Monitor,
 ) -> Result<Repaired, MouldError> {
     let (frame, cell) = (axes(draw), options.cell);
-    let turned = turn(mesh, |p| {
-        Vec3::new(p.dot(&frame[0]), p.dot(&frame[1]), p.dot(&frame[2]))
-    });
+    let into = |p: &Vec3| Vec3::new(p.dot(&frame[0]), p.dot(&frame[1]), p.dot(&frame[2]));
+    let turned = turn(mesh, into);
     let on_grid = RemeshOptions {
         voxel: Some(cell),
         min_tunnel: 0.0,
@@ -84,7 +89,9 @@ pub fn repair(
         source => MouldError::Grid { cell, source },
     };
     let mut field = remesh(&turned, &on_grid, monitor).map_err(fail)?.field;
-    let before = (volume(&field), multiple(&field));
+    let volume_before = volume(&field);
+    let open = fill_cores(&mut field, options, into)?;
+    let before = multiple(&field);
     match options.kind {
         Repair::Off => {}
         Repair::Fill => fill(&mut field),
@@ -97,7 +104,11 @@ pub fn repair(
             options.parting,
         );
     }
-    let after = (volume(&field), multiple(&field));
+    let after = multiple(&field);
+    for (v, value) in open {
+        field.values[v] = value;
+    }
+    let volume_after = volume(&field);
     // As a density: 1/2 at the surface, one voxel up and down.
     let h = field.spacing as f32;
     let density = VoxelGrid {
@@ -108,9 +119,31 @@ pub fn repair(
     let back = |p: &Vec3| p.x * frame[0] + p.y * frame[1] + p.z * frame[2];
     Ok(Repaired {
         mesh: turn(out.solid.mesh(), back),
-        volume: [before.0, after.0],
-        multiple: [before.1, after.1],
+        volume: [volume_before, volume_after],
+        multiple: [before, after],
     })
+}
+
+/// Makes material of what cores make; gives the values that were there.
+fn fill_cores(
+    field: &mut VoxelGrid<f32>,
+    options: &RepairOptions,
+    into: impl Fn(&Vec3) -> Vec3,
+) -> Result<Vec<(usize, f32)>, MouldError> {
+    let places: Vec<Vec3> = options.cores.iter().map(&into).collect();
+    let turned = |bore: &Capsule| Capsule {
+        a: into(&bore.a),
+        b: into(&bore.b),
+        ..*bore
+    };
+    let bores: Vec<Capsule> = options.bores.iter().map(turned).collect();
+    let cores = cored(field, &places, &bores)?;
+    let within = (0..cores.len()).filter(|&v| cores[v]);
+    let open: Vec<(usize, f32)> = within.map(|v| (v, field.values[v])).collect();
+    for (v, _) in &open {
+        field.values[*v] = 0.5 * field.spacing as f32;
+    }
+    Ok(open)
 }
 
 fn turn(mesh: &TriMesh, f: impl Fn(&Vec3) -> Vec3) -> TriMesh {

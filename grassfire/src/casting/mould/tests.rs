@@ -171,3 +171,33 @@ fn walls_and_options_are_checked() {
     );
     assert!(matches!(none, Err(MouldError::Empty)));
 }
+
+#[test]
+fn a_core_keeps_its_undercut_open() {
+    let mesh = beam();
+    let options = MouldOptions {
+        repair: Repair::Fill,
+        repair_draft: 1.0,
+        cell: Some(1.0),
+        cores: vec![[30.0, 8.0, 16.0]],
+        ..along([0.0, 0.0, 1.0])
+    };
+    let repaired = look(&mesh, &options).repaired.expect("asked for");
+    assert_eq!(repaired.multiple[1], 0);
+    let wanted = 60.0 * (30.0 * 32.0 - 13.0 * 24.0);
+    assert!(
+        (repaired.volume[1] / wanted - 1.0).abs() < 0.05,
+        "{}",
+        repaired.volume[1]
+    );
+    let again = look(&repaired.mesh, &along([0.0, 0.0, 1.0]));
+    let off = again.undercut_volume / (13.0 * 24.0 * 60.0) - 1.0;
+    assert!(off.abs() < 0.1, "{off}");
+    assert!(again.undercuts[0].place.y > 5.0);
+    let nowhere = MouldOptions {
+        cores: vec![[30.0, 80.0, 16.0]],
+        ..options
+    };
+    let refused = mould(&mesh, &nowhere, &Monitor::default());
+    assert!(matches!(refused, Err(MouldError::Core { distance }) if distance > 60.0));
+}

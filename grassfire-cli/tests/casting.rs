@@ -1,0 +1,176 @@
+//! Feeding, mould and freezing of a plate made here: feeders as bodies, and what is refused with which exit code.
+
+mod support;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use support::{Run, number, plate_with_hole, reconstruct};
+
+const SIDE: f64 = 40.0;
+const HOLE: f64 = 10.0;
+const THICK: f64 = 5.0;
+
+fn plate(folder: &Path) -> PathBuf {
+    let path = folder.join("plate.stl");
+    std::fs::write(&path, plate_with_hole(SIDE, HOLE, THICK)).expect("writes");
+    path
+}
+
+fn run(folder: &Path, args: &[&str]) -> Run {
+    let all: Vec<&str> = ["--voxel", "0.8"].iter().chain(args).copied().collect();
+    reconstruct(&plate(folder), &folder.join("out"), &all)
+}
+
+fn command(name: &str, folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_grassfire"))
+        .arg(name)
+        .arg(plate(folder))
+        .arg("-o")
+        .arg(folder.join("out"))
+        .args(args)
+        .output()
+        .expect("the program starts")
+}
+
+/// Two plates side by side.
+fn two_plates(folder: &Path) -> PathBuf {
+    let one = plate_with_hole(SIDE, HOLE, THICK);
+    let mut both = one.clone();
+    let count = 2 * u32::from_le_bytes([one[80], one[81], one[82], one[83]]);
+    both[80..84].copy_from_slice(&count.to_le_bytes());
+    for triangle in one[84..].chunks(50) {
+        let mut moved = triangle.to_vec();
+        for corner in 0..3 {
+            let at = 12 + 12 * corner;
+            let x: [u8; 4] = moved[at..at + 4].try_into().expect("four bytes");
+            let x = f32::from_le_bytes(x) + 60.0;
+            moved[at..at + 4].copy_from_slice(&x.to_le_bytes());
+        }
+        both.extend(moved);
+    }
+    let path = folder.join("plates.stl");
+    std::fs::write(&path, both).expect("writes");
+    path
+}
+
+#[test]
+fn sections_grow_and_the_part_is_measured_against_the_grown_proposal() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let args = ["--feeder", "18,0,2.5", "--growth", "0.05"];
+    #[cfg(feature = "occt")]
+    let args = [&args[..], &["--format", "casting"]].concat();
+    let run = run(folder.path(), &args);
+    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+    let report = run.report();
+    assert!(number(&report, "/feed/violations_before") > 0.0);
+    assert_eq!(number(&report, "/feed/violations"), 0.0);
+    assert!(number(&report, "/feed/added_volume") > 100.0);
+    let off = number(&report, "/volume/relative_difference");
+    assert!(off.abs() < 0.02, "{off}");
+    // On a plate nothing falls before; afterwards no more than corners and the voxels' noise do.
+    let after = number(&report, "/feed/falling/falling");
+    assert!(after < 0.05, "{after}");
+    #[cfg(feature = "occt")]
+    {
+        let text = String::from_utf8(run.file("casting.step")).expect("text");
+        assert_eq!(text.matches("MANIFOLD_SOLID_BREP(").count(), 3);
+        assert!(text.contains("'feeder 1'") && text.contains("'neck 1'"));
+        let yields = number(&report, "/feed/casting_yield");
+        let feeder = number(&report, "/feed/zones/0/volume");
+        let part = number(&report, "/volume/solid");
+        assert!((yields - part / (part + feeder)).abs() < 1e-6, "{yields}");
+    }
+}
+
+#[test]
+fn feeding_that_cannot_be_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let refused = |run: Run, code: i32, word: &str| {
+        assert_eq!(run.code, Some(code), "{}", run.stderr);
+        let errors = run.lines("error: ");
+        assert!(
+            errors.len() == 1 && errors[0].contains(word),
+            "{}",
+            run.stderr
+        );
+        assert_eq!(run.lines("hint: ").len(), 1, "{}", run.stderr);
+        assert!(!run.output.join("part.step").exists());
+    };
+    let place = |args: &[&str]| run(folder.path(), args);
+    let outside = place(&["--feeder", "80,0,2.5"]);
+    refused(outside, 2, "from the part's surface");
+    let steep = place(&["--feeder", "18,0,2.5", "--growth", "0.5"]);
+    refused(steep, 2, "feed.growth is 0.5");
+    if cfg!(feature = "occt") {
+        let none = place(&["--format", "casting"]);
+        refused(none, 2, "no feeder is given");
+    }
+    // Draft along x from a parting plane at one end, feeding from the other.
+    let draft = ["feed.draft=2", "feed.draw=[1,0,0]", "feed.parting=-20"];
+    let mut args = vec!["--feeder", "18,0,2.5", "--growth", "0.05"];
+    draft.iter().for_each(|set| args.extend(["--set", *set]));
+    refused(place(&args), 3, "contradict each other: around");
+    let plates = two_plates(folder.path());
+    let args = ["--voxel", "0.8", "--feeder", "18,0,2.5"];
+    let apart = reconstruct(&plates, &folder.path().join("out"), &args);
+    refused(apart, 2, "not connected to one");
+}
+
+#[test]
+fn freezing_without_data_or_sand_and_moulds_without_undercut_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let metal = r#"solidify.metal={"name":"bronze","solidus":900,"liquidus":1000,"pour":1100,"density":8000,"conductivity":[],"heat_capacity":[[20,400]],"latent_heat":2e5,"feeding_ends":0.5,"interface":[[20,500]],"niyama":0.5,"shrinkage":0.04,"source":"none"}"#;
+    for (name, args, word) in [
+        ("solidify", vec!["--set", metal], "table conductivity"),
+        (
+            "solidify",
+            vec!["--set", "solidify.material=bronze"],
+            "bronze",
+        ),
+        ("solidify", vec!["--set", "solidify.padding=0.1"], "padding"),
+        (
+            "mould",
+            vec![
+                "--draw",
+                "0,0,1",
+                "--set",
+                "mould.repair=fill",
+                "--set",
+                "mould.cores=[[0,0,0]]",
+            ],
+            "mould.cores",
+        ),
+    ] {
+        let output = command(name, folder.path(), &args);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {stderr}");
+        assert!(stderr.contains(word), "{args:?}: {stderr}");
+        assert!(!folder.path().join("out").join("report.json").exists());
+    }
+}
+
+#[test]
+fn a_proposal_with_an_undercut_is_filled_before_its_skeleton_is_made() {
+    // Along x the hole of the plate lies between material.
+    let folder = tempfile::tempdir().expect("a folder");
+    let args = [
+        "--draw",
+        "1,0,0",
+        "--set",
+        "mould.repair=fill",
+        "--recognise",
+        "off",
+    ];
+    let run = run(folder.path(), &args);
+    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+    let report = run.report();
+    assert!(number(&report, "/mould/multiple_lines_before") > 20.0);
+    assert_eq!(number(&report, "/mould/multiple_lines"), 0.0);
+    assert!(number(&report, "/volume/solid") > 0.98 * SIDE * SIDE * THICK);
+    assert_eq!(report["topology"]["solid"]["b1"], 0);
+    // Faces along the draw waver by less than a tenth of a voxel; the hole was an undercut of its whole volume.
+    let left = number(&report, "/mould/undercut_volume");
+    let hole = std::f64::consts::PI * HOLE * HOLE * THICK;
+    assert!(left < 0.1 * hole, "{left}");
+}
