@@ -10,7 +10,7 @@ use crate::fit::{FitOptions, Fitted, fit, volume};
 use crate::medial::MedialAxis;
 use crate::monitor::Monitor;
 use crate::radii;
-use crate::remesh::{Remeshed, wrap};
+use crate::remesh::{Remeshed, WrapOptions, wrap};
 use crate::report::Limits;
 use crate::skeleton::{self, QuadSkeleton, Skeleton, quad_skeleton};
 use crate::spline::{
@@ -187,7 +187,8 @@ impl Workshop<'_> {
     }
 
     /// The last resort for bulky parts: a quad mesh wrapped around the proposal, fitted like a thickened one. The
-    /// skeleton is still delivered; every point of the body belongs to its nearest skeleton point.
+    /// skeleton is still delivered; every point of the body belongs to its nearest skeleton point. The first size whose fit
+    /// is sound wins, else the best of all.
     fn wrapped(
         &mut self,
         skeleton: Option<QuadSkeleton>,
@@ -196,16 +197,31 @@ impl Workshop<'_> {
             Some(skeleton) => skeleton,
             None => self.skeleton(1.0)?,
         };
-        let (field, solid) = (&self.base.remeshed.field, self.axis.solid);
-        let (options, monitor) = (&self.options.wrap, self.monitor);
-        let mesh = self
-            .record
-            .stage("thicken", || wrap(field, solid, options, monitor))?;
-        let Some(mesh) = mesh else { return Ok(None) };
-        let body = self
-            .record
-            .stage("thicken", || thicken::adopt(mesh, &skeleton.skeleton))?;
-        self.fitted(skeleton, body, true).map(Some)
+        let mut best: Option<(Score, Shape)> = None;
+        for &size in &self.options.wrap.sizes {
+            let options = WrapOptions {
+                sizes: vec![size],
+                ..self.options.wrap.clone()
+            };
+            let (field, solid) = (&self.base.remeshed.field, self.axis.solid);
+            let mesh = self
+                .record
+                .stage("thicken", || wrap(field, solid, &options, self.monitor))?;
+            let Some(mesh) = mesh else { continue };
+            let body = self
+                .record
+                .stage("thicken", || thicken::adopt(mesh, &skeleton.skeleton))?;
+            let (score, shape) = self.fitted(skeleton.clone(), body, true)?;
+            let sound = score.sound();
+            let least = best.as_ref();
+            if least.is_none_or(|(least, _)| score.worse() < least.worse()) {
+                best = Some((score, shape));
+            }
+            if sound {
+                break;
+            }
+        }
+        Ok(best)
     }
 
     fn fitted(

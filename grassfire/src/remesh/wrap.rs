@@ -25,7 +25,8 @@ pub struct WrapOptions {
 impl Default for WrapOptions {
     fn default() -> Self {
         Self {
-            sizes: vec![6.0, 5.0, 4.0, 3.2, 2.5, 2.0],
+            // Sizes in between come last: they serve where gaps close on all of the others.
+            sizes: vec![6.0, 5.0, 4.0, 3.2, 2.5, 2.0, 5.5, 4.5, 3.6, 2.8, 2.2],
             max_quads: 8000,
         }
     }
