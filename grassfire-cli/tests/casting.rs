@@ -5,22 +5,7 @@ mod support;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use support::{Run, number, plate_with_hole, reconstruct};
-
-const SIDE: f64 = 40.0;
-const HOLE: f64 = 10.0;
-const THICK: f64 = 5.0;
-
-fn plate(folder: &Path) -> PathBuf {
-    let path = folder.join("plate.stl");
-    std::fs::write(&path, plate_with_hole(SIDE, HOLE, THICK)).expect("writes");
-    path
-}
-
-fn run(folder: &Path, args: &[&str]) -> Run {
-    let all: Vec<&str> = ["--voxel", "0.8"].iter().chain(args).copied().collect();
-    reconstruct(&plate(folder), &folder.join("out"), &all)
-}
+use support::{HOLE, Run, SIDE, THICK, number, plate, plate_with_hole, reconstruct, run_plate};
 
 fn command(name: &str, folder: &Path, args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_grassfire"))
@@ -60,7 +45,7 @@ fn sections_grow_and_the_part_is_measured_against_the_grown_proposal() {
     let args = ["--feeder", "18,0,2.5", "--growth", "0.05"];
     #[cfg(feature = "occt")]
     let args = [&args[..], &["--format", "casting"]].concat();
-    let run = run(folder.path(), &args);
+    let run = run_plate(folder.path(), &args);
     assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
     let report = run.report();
     assert!(number(&report, "/feed/violations_before") > 0.0);
@@ -97,7 +82,7 @@ fn feeding_that_cannot_be_is_refused() {
         assert_eq!(run.lines("hint: ").len(), 1, "{}", run.stderr);
         assert!(!run.output.join("part.step").exists());
     };
-    let place = |args: &[&str]| run(folder.path(), args);
+    let place = |args: &[&str]| run_plate(folder.path(), args);
     let outside = place(&["--feeder", "80,0,2.5"]);
     refused(outside, 2, "from the part's surface");
     let steep = place(&["--feeder", "18,0,2.5", "--growth", "0.5"]);
@@ -162,7 +147,7 @@ fn a_proposal_with_an_undercut_is_filled_before_its_skeleton_is_made() {
         "--recognise",
         "off",
     ];
-    let run = run(folder.path(), &args);
+    let run = run_plate(folder.path(), &args);
     assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
     let report = run.report();
     assert!(number(&report, "/mould/multiple_lines_before") > 20.0);

@@ -2,26 +2,17 @@
 
 mod support;
 
-use std::path::{Path, PathBuf};
+#[cfg(feature = "occt")]
+use std::path::Path;
+use std::path::PathBuf;
 #[cfg(feature = "occt")]
 use std::process::{Command, Output};
 
 #[cfg(feature = "occt")]
 use serde_json::Value;
 #[cfg(feature = "occt")]
-use support::number;
-use support::{Run, plate_with_hole, reconstruct};
-
-const SIDE: f64 = 40.0;
-const HOLE: f64 = 10.0;
-const THICK: f64 = 5.0;
-
-fn run(folder: &Path, args: &[&str]) -> Run {
-    let plate = folder.join("plate.stl");
-    std::fs::write(&plate, plate_with_hole(SIDE, HOLE, THICK)).expect("writes");
-    let all: Vec<&str> = ["--voxel", "0.8"].iter().chain(args).copied().collect();
-    reconstruct(&plate, &folder.join("out"), &all)
-}
+use support::{HOLE, Run, THICK, number};
+use support::{reconstruct, run_plate};
 
 /// A ring along z in the plate's hole, as a text STL.
 #[cfg(feature = "occt")]
@@ -62,7 +53,7 @@ fn seated(folder: &Path, args: &[&str]) -> Run {
         .chain(args)
         .copied()
         .collect();
-    run(folder, &all)
+    run_plate(folder, &all)
 }
 
 #[cfg(feature = "occt")]
@@ -130,7 +121,7 @@ fn all_formats_are_written_listed_and_taken_away_again() {
 #[test]
 fn three_mf_is_a_closed_input_again() {
     let folder = tempfile::tempdir().expect("a folder");
-    let first = run(folder.path(), &["--format", "3mf"]);
+    let first = run_plate(folder.path(), &["--format", "3mf"]);
     assert!(matches!(first.code, Some(0 | 1)), "{}", first.stderr);
     let again = folder.path().join("again");
     std::fs::create_dir(&again).expect("a folder");
@@ -158,7 +149,7 @@ fn unknown_formats_and_chords_are_refused_before_anything_is_written() {
         bad.push((vec!["--format", "iges"], "no OpenCASCADE"));
     }
     for (args, word) in bad {
-        let run = run(folder.path(), &args);
+        let run = run_plate(folder.path(), &args);
         assert_eq!(run.code, Some(2), "{}", run.stderr);
         let errors = run.lines("error: ");
         assert!(

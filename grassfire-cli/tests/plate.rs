@@ -2,32 +2,15 @@
 
 mod support;
 
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use serde_json::Value;
-use support::{Run, finish, number, plate_with_hole, reconstruct, start};
-
-const SIDE: f64 = 40.0;
-const HOLE: f64 = 10.0;
-const THICK: f64 = 5.0;
-
-fn plate(folder: &Path) -> PathBuf {
-    let path = folder.join("plate.stl");
-    std::fs::write(&path, plate_with_hole(SIDE, HOLE, THICK)).expect("writes");
-    path
-}
-
-/// Runs the plate at a voxel of 0.8 mm.
-fn run(folder: &Path, args: &[&str]) -> Run {
-    let all: Vec<&str> = ["--voxel", "0.8"].iter().chain(args).copied().collect();
-    reconstruct(&plate(folder), &folder.join("out"), &all)
-}
+use support::{HOLE, SIDE, THICK, finish, number, plate, run_plate, start};
 
 #[test]
 fn plate_becomes_a_good_part() {
     let folder = tempfile::tempdir().expect("a folder");
-    let run = run(folder.path(), &["--json"]);
+    let run = run_plate(folder.path(), &["--json"]);
     assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
     let printed: Value = serde_json::from_str(&run.stdout).expect("--json prints JSON");
     assert_eq!(printed, run.report());
@@ -61,7 +44,7 @@ fn edits_thicken_their_place_only() {
     let folder = tempfile::tempdir().expect("a folder");
     let half =
         r#"edits=[{"within":{"box":{"min":[-100,-100,-100],"max":[100,-10,100]}},"scale":1.3}]"#;
-    let run_with = |edits: &str| run(folder.path(), &["--recognise", "off", "--set", edits]);
+    let run_with = |edits: &str| run_plate(folder.path(), &["--recognise", "off", "--set", edits]);
     let report = run_with(half).report();
     let edits = &report["edits"];
     assert!(number(edits, "/edits/0/points") >= 4.0, "{edits}");
@@ -80,7 +63,7 @@ fn edits_thicken_their_place_only() {
 fn skeleton_comes_back_as_ply_and_as_obj() {
     let folder = tempfile::tempdir().expect("a folder");
     // With its bore cut out the plate is one ring of members, which an OBJ cannot hold.
-    let first = run(folder.path(), &["--recognise", "off"]);
+    let first = run_plate(folder.path(), &["--recognise", "off"]);
     let (quads, topology) = {
         let report = first.report();
         (
@@ -93,7 +76,7 @@ fn skeleton_comes_back_as_ply_and_as_obj() {
     let obj = folder.path().join("mine.obj");
     std::fs::write(&obj, obj_of(&first.file("skeleton.ply"))).expect("writes");
     for skeleton in [ply, obj] {
-        let again = run(
+        let again = run_plate(
             folder.path(),
             &[
                 "--recognise",
@@ -152,7 +135,7 @@ fn obj_of(ply: &[u8]) -> String {
 #[test]
 fn a_stage_that_fails_ends_with_3() {
     let folder = tempfile::tempdir().expect("a folder");
-    let run = run(folder.path(), &["--set", "retry.quad_sizes=[]"]);
+    let run = run_plate(folder.path(), &["--set", "retry.quad_sizes=[]"]);
     assert_eq!(run.code, Some(3), "{}", run.stderr);
     assert_eq!(
         (run.lines("error: ").len(), run.lines("hint: ").len()),
@@ -166,7 +149,7 @@ fn a_stage_that_fails_ends_with_3() {
 #[test]
 fn a_missed_check_ends_with_1_and_everything_is_written() {
     let folder = tempfile::tempdir().expect("a folder");
-    let run = run(folder.path(), &["--set", "report.limits.distance_rms=0"]);
+    let run = run_plate(folder.path(), &["--set", "report.limits.distance_rms=0"]);
     assert_eq!(run.code, Some(1), "{}", run.stderr);
     assert!(
         run.stdout.contains("not met") && run.stdout.contains("distance.rms"),
@@ -180,7 +163,7 @@ fn a_missed_check_ends_with_1_and_everything_is_written() {
 fn fewest_faces_are_as_smooth_and_stay_near() {
     let folder = tempfile::tempdir().expect("a folder");
     let faces = |mode: &str| {
-        let run = run(folder.path(), &["--faces", mode]);
+        let run = run_plate(folder.path(), &["--faces", mode]);
         assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
         run.report()
     };
@@ -227,7 +210,7 @@ fn a_body_that_cannot_be_united_ends_with_1_and_lies_beside_the_part() {
     let folder = tempfile::tempdir().expect("a folder");
     let loose = folder.path().join("loose.stl");
     std::fs::write(&loose, cube(60.0)).expect("writes");
-    let run = run(
+    let run = run_plate(
         folder.path(),
         &["--non-design", &loose.display().to_string()],
     );

@@ -139,6 +139,24 @@ fn work(process: u32) -> f64 {
     times.filter_map(|t| t.parse::<f64>().ok()).sum::<f64>() / TICKS
 }
 
+/// Side of the plate, radius of its hole, and its thickness, mm.
+pub const SIDE: f64 = 40.0;
+pub const HOLE: f64 = 10.0;
+pub const THICK: f64 = 5.0;
+
+/// Writes the plate with its hole.
+pub fn plate(folder: &Path) -> PathBuf {
+    let path = folder.join("plate.stl");
+    std::fs::write(&path, plate_with_hole(SIDE, HOLE, THICK)).expect("writes");
+    path
+}
+
+/// Runs the plate at a voxel of 0.8 mm.
+pub fn run_plate(folder: &Path, args: &[&str]) -> Run {
+    let all: Vec<&str> = ["--voxel", "0.8"].iter().chain(args).copied().collect();
+    reconstruct(&plate(folder), &folder.join("out"), &all)
+}
+
 /// A square plate with a round hole in its middle, as binary STL: genus 1, `side` and `thick` mm.
 pub fn plate_with_hole(side: f64, hole: f64, thick: f64) -> Vec<u8> {
     const SEGMENTS: usize = 64;
