@@ -67,33 +67,42 @@ fn must_be_good(run: &Run) -> Value {
     report
 }
 
-/// A part whose tunnels are all real: the solid has the genus of the file.
-fn bracket(name: &str, genus: i64) {
+/// A bracket whose tunnels are all real: the solid has the genus of the file, at most 200 faces, and is nowhere farther from
+/// the file than `farthest` voxels.
+fn bracket(name: &str, genus: i64, farthest: f64) {
     let Some((_folder, run)) = run(name, &[]) else {
         return;
     };
     let report = must_be_good(&run);
     assert_eq!(report["solid"]["genus"].as_i64(), Some(genus));
+    let faces = report["solid"]["faces"].as_u64();
+    assert!(faces.is_some_and(|n| n <= 200), "{faces:?} faces");
+    let distance = |key: &str| number(&report, key) / number(&report, "/distance/voxel");
+    let [rms, p95, max] = ["/distance/rms", "/distance/p95", "/distance/max"].map(distance);
+    assert!(
+        rms <= 0.25 && p95 <= 0.5 && max <= farthest,
+        "{rms} rms, {p95} p95, {max} max"
+    );
 }
 
 #[test]
 fn simjeb_055_becomes_a_good_solid() {
-    bracket("simjeb_055.obj", 9);
+    bracket("simjeb_055.obj", 9, 1.5);
 }
 
 #[test]
 fn simjeb_398_becomes_a_good_solid() {
-    bracket("simjeb_398.obj", 7);
+    bracket("simjeb_398.obj", 7, 2.0);
 }
 
 #[test]
 fn simjeb_576_becomes_a_good_solid() {
-    bracket("simjeb_576.obj", 13);
+    bracket("simjeb_576.obj", 13, 2.6);
 }
 
 #[test]
-fn simjeb_623_becomes_a_good_solid() {
-    bracket("simjeb_623.obj", 9);
+fn simjeb_623_had_slits_between_members_three_voxels_deep() {
+    bracket("simjeb_623.obj", 9, 1.5);
 }
 
 #[test]

@@ -61,8 +61,10 @@ impl Goal {
         figures.both.iter().all(close)
     }
 
-    /// Distance and volume in one number, the lower the better.
+    /// Distance and volume in one number, the lower the better. Single places count by how far they are beyond the goal.
     pub fn error(&self, figures: &Figures) -> f64 {
-        figures.rms() / self.rms.max(1e-6) + (figures.volume - 1.0).abs() / VOLUME
+        let [a, b] = figures.both.map(|d| d.max);
+        let beyond = (a.max(b) / self.max.max(1e-6) - 1.0).max(0.0);
+        figures.rms() / self.rms.max(1e-6) + (figures.volume - 1.0).abs() / VOLUME + beyond
     }
 }

@@ -3,6 +3,7 @@
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
+use super::data::{Nearby, nearest_samples};
 use super::equations::{Equations, solve};
 use super::surface::Surface;
 use super::targets::{IsoSamples, PointGrid, flow_to_surface};
@@ -16,7 +17,7 @@ pub(super) struct Solver<'a> {
     pub field: &'a VoxelGrid<f32>,
     pub iso: &'a IsoSamples,
     pub options: FitOptions,
-    equations: Equations,
+    pub equations: Equations,
     /// Factor on the fairness of each control point.
     pub fairness: Vec<f64>,
     /// Factor on the data of each sample.
@@ -25,15 +26,27 @@ pub(super) struct Solver<'a> {
     pub least_fairness: f64,
     /// Volume that every round aims at, mm3.
     pub volume: Option<f64>,
+    /// What the samples around each control point showed in this round.
+    pub nearby: Vec<Nearby>,
 }
 
 /// Weights of one round.
-struct Schedule {
+pub(super) struct Schedule {
     /// Distance from which on a sample counts less, voxels.
-    cap: f64,
+    pub cap: f64,
     fairness: f64,
-    tangential: f64,
+    pub tangential: f64,
+    /// Samples that look across the way to the proposal pull, too.
+    pub sunk: bool,
 }
+
+/// The first round in which samples that look across the way to the proposal pull. Before that most of them are only
+/// where the thickened body was too crude, and would drag the net to the wrong side.
+const SUNK_FROM: u32 = 8;
+/// Fairness around such samples is at least this: a slit that closes over must smooth out on the whole.
+const SUNK_FAIRNESS: f64 = 0.3;
+/// Evenness around samples that are far off is at least this: nets that are crowded there cannot move.
+const FAR_EVENNESS: f64 = 0.1;
 
 impl<'a> Solver<'a> {
     pub fn new(
@@ -49,6 +62,7 @@ impl<'a> Solver<'a> {
             trust: vec![1.0; surface.samples.rows()],
             least_fairness: options.fairness,
             volume: None,
+            nearby: vec![Nearby::default(); surface.coarse.point_count],
             surface,
             field,
             iso,
@@ -64,6 +78,7 @@ impl<'a> Solver<'a> {
             cap: (8.0 * 0.7f64.powi(decay)).max(2.0),
             fairness: 0.6f64.powi(decay).max(self.least_fairness),
             tangential: if round > 3 { 0.03 } else { 0.1 },
+            sunk: round >= SUNK_FROM,
         };
         let at = self.surface.samples.apply(points);
         let (normals, areas) = self.surface.normals_and_areas(&at);
@@ -114,69 +129,15 @@ impl<'a> Solver<'a> {
         Ok(points)
     }
 
-    /// Point-to-plane rows both ways and tangential damping; returns the area-weighted distance sum.
-    fn add_data(
-        &mut self,
-        at: &[Vec3],
-        normals: &[Vec3],
-        areas: &[f64],
-        schedule: &Schedule,
-    ) -> f64 {
-        let flowed: Vec<(Vec3, Vec3)> = at
-            .par_iter()
-            .with_min_len(512)
-            .map(|p| flow_to_surface(self.field, p, 6))
-            .collect();
-        let mut blocks = vec![Matrix3::zeros(); at.len()];
-        let mut pulls = vec![Vec3::zeros(); at.len()];
-        let mut sum = 0.0;
-        for (j, (place, outward)) in flowed.iter().enumerate() {
-            let d = (place - at[j]).norm();
-            sum += areas[j] * d;
-            let cosine = outward.dot(&normals[j]);
-            if cosine >= 0.2 {
-                let w = self.trust[j]
-                    * areas[j]
-                    * cosine.min(1.0)
-                    * (schedule.cap / d.max(1e-9)).min(1.0);
-                blocks[j] += w * outward * outward.transpose();
-                pulls[j] += w * outward * outward.dot(place);
-            }
-            let w = schedule.tangential * areas[j];
-            blocks[j] += w * Matrix3::identity();
-            pulls[j] += w * at[j];
-        }
-        let share = areas.iter().sum::<f64>() / self.iso.points.len().max(1) as f64;
-        let grid = PointGrid::new(at, 1.5);
-        let nearest: Vec<Option<(u32, f64)>> = self
-            .iso
-            .points
-            .par_iter()
-            .with_min_len(512)
-            .map(|p| grid.nearest(at, p))
-            .collect();
-        for ((place, outward), found) in self.iso.points.iter().zip(&self.iso.normals).zip(&nearest)
-        {
-            let Some((j, d)) = *found else { continue };
-            let j = j as usize;
-            let cosine = outward.dot(&normals[j]);
-            if cosine > 0.1 {
-                let w = self.trust[j] * share * cosine * (schedule.cap / d.max(1e-9)).min(1.0);
-                blocks[j] += w * outward * outward.transpose();
-                pulls[j] += w * outward * outward.dot(place);
-            }
-        }
-        for j in 0..at.len() {
-            let (points, weights) = self.surface.samples.row(j);
-            self.equations.add(points, weights, &blocks[j], &pulls[j]);
-        }
-        sum
-    }
-
     fn add_fairness(&mut self, points: &[Vec3], mean_area: f64, fairness: f64) {
         let identity = Matrix3::identity();
         for r in 0..points.len() {
-            let weight = fairness * mean_area * self.fairness[r];
+            let least = if self.nearby[r].sunk {
+                SUNK_FAIRNESS
+            } else {
+                0.0
+            };
+            let weight = mean_area * least.max(fairness * self.fairness[r]);
             let (indices, weights) = self.surface.bending.row(r);
             self.equations
                 .add(indices, weights, &(weight * identity), &Vec3::zeros());
@@ -198,7 +159,12 @@ impl<'a> Solver<'a> {
         let control = normals.iter().zip(&self.fairness);
         for (r, (normal, fairness)) in control.enumerate().take(self.surface.coarse.point_count) {
             // Local fairness asks for a calmer net, too.
-            let weight = self.options.evenness * mean_area * fairness.min(20.0);
+            let least = if self.nearby[r].far {
+                FAR_EVENNESS
+            } else {
+                0.0
+            };
+            let weight = least.max(self.options.evenness) * mean_area * fairness.min(20.0);
             let block = weight * (Matrix3::identity() - normal * normal.transpose());
             let (indices, weights) = self.surface.laplacian.row(r);
             self.equations.add(indices, weights, &block, &Vec3::zeros());
@@ -236,14 +202,7 @@ impl<'a> Solver<'a> {
                 way.norm().copysign(way.dot(normal))
             })
             .collect();
-        let grid = PointGrid::new(&at, 1.5);
-        let nearest: Vec<Option<(u32, f64)>> = self
-            .iso
-            .points
-            .par_iter()
-            .with_min_len(512)
-            .map(|p| grid.nearest(&at, p))
-            .collect();
+        let nearest = nearest_samples(&at, &self.iso.points);
         for (p, found) in self.iso.points.iter().zip(&nearest) {
             let Some((j, _)) = *found else { continue };
             let j = j as usize;

@@ -146,7 +146,9 @@ impl Workshop<'_> {
         });
         let (mut left, mut attempt) = (sizes.to_vec(), 0);
         loop {
-            let sound = best.as_ref().map(|(score, _)| score.sound());
+            let sound = best
+                .as_ref()
+                .map(|(score, _)| score.sound() && !score.torn());
             let Some(size) = next_size(&mut left, sound.ok(), self.base.united.is_some()) else {
                 break;
             };
@@ -304,10 +306,14 @@ struct Score {
     folds: usize,
     /// Distance and volume over their limits, the largest ratio; above 1 a limit is exceeded.
     excess: f64,
+    /// Largest distance, voxels.
+    farthest: f64,
 }
 
 /// The fit measures on its own samples; the final figures may be a little worse.
 const MARGIN: f64 = 0.95;
+/// Bodies that are farther off somewhere have a slit that the proposal has not, or lack a member, voxels.
+const TORN: f64 = 3.0;
 /// Bodies that miss a limit by more than this factor and cut themselves are given up.
 const HOPELESS: f64 = 3.0;
 /// Sound bodies that miss a limit by up to this factor are kept: they can be edited, wrapped ones cannot.
@@ -323,7 +329,13 @@ impl Score {
             crossings: fitted.self_intersections.len(),
             folds: flipped(fitted),
             excess: rms.max(p95).max(volume) / MARGIN,
+            farthest: both.iter().map(|d| d.max).fold(0.0, f64::max) / voxel,
         }
+    }
+
+    /// Close on the whole, if at all, but not at some place.
+    fn torn(&self) -> bool {
+        self.farthest > TORN
     }
 
     fn sound(&self) -> bool {
@@ -331,7 +343,7 @@ impl Score {
     }
 
     fn good(&self) -> bool {
-        self.sound() && self.excess <= 1.0
+        self.sound() && self.excess <= 1.0 && !self.torn()
     }
 
     /// Sound, and not so far off that a body without a skeleton would serve better.
@@ -344,9 +356,14 @@ impl Score {
         self.crossings > 0 && self.excess > HOPELESS
     }
 
-    /// Orders tries: soundness first, then closeness.
+    /// Orders tries: soundness first, then closeness, everywhere and on the whole.
     fn worse(&self) -> (usize, usize, f64) {
-        (self.crossings, self.folds, self.excess)
+        let far = if self.torn() {
+            self.farthest / TORN
+        } else {
+            0.0
+        };
+        (self.crossings, self.folds, self.excess.max(far))
     }
 }
 
@@ -366,6 +383,11 @@ impl std::fmt::Display for Score {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.crossings {
             0 if self.folds > 0 => write!(f, "{} faces of the body fold over", self.folds),
+            0 if self.torn() => write!(
+                f,
+                "the body is {:.1} voxels from the proposal at one place",
+                self.farthest
+            ),
             0 => write!(
                 f,
                 "the body misses the proposal by {:.2} times the limits for distance and volume",
@@ -413,6 +435,19 @@ pub(super) fn surface(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_body_with_a_slit_of_four_voxels_was_taken_as_good() {
+        let score = |farthest: f64| Score {
+            crossings: 0,
+            folds: 0,
+            excess: 0.5,
+            farthest,
+        };
+        let (torn, close) = (score(4.0), score(1.0));
+        assert!(close.good() && !torn.good() && torn.sound());
+        assert!(close.worse() < torn.worse());
+    }
 
     #[test]
     fn a_body_that_cut_itself_was_tried_with_finer_quads_before_coarser_ones() {

@@ -1,0 +1,91 @@
+//! One start of the fit: rounds, untangling, refinement, settling.
+
+use super::goal::{Figures, Goal};
+use super::targets::IsoSamples;
+use super::{FitError, FitOptions, Fitted, STAGE, refine, round, settle, surface, untangle};
+use crate::Vec3;
+use crate::monitor::Monitor;
+use crate::skeleton::Skeleton;
+use crate::thicken::ThickenedBody;
+use crate::voxel::VoxelGrid;
+
+/// A fit from one start, and how good it is.
+pub(super) struct Attempt {
+    pub fitted: Fitted,
+    /// It neither intersects itself nor folds, and is close everywhere.
+    pub met: bool,
+    sound: bool,
+    error: f64,
+}
+
+impl Attempt {
+    /// Soundness first, then distance and volume.
+    pub fn better_than(&self, other: &Self) -> bool {
+        if self.sound == other.sound {
+            self.error < other.error
+        } else {
+            self.sound
+        }
+    }
+}
+
+/// Steps 1 to 5 of [`super::fit`], with the evenness of `options`.
+pub(super) fn attempt(
+    body: &ThickenedBody,
+    skeleton: &Skeleton,
+    field: &VoxelGrid<f32>,
+    iso: &IsoSamples,
+    iso_volume: f64,
+    options: &FitOptions,
+    monitor: &Monitor,
+) -> Result<Attempt, FitError> {
+    monitor.step(STAGE, "operators", 0.0)?;
+    let surface = surface::Surface::new(body, field)?;
+    let thickened: Vec<Vec3> = body.mesh.points.iter().map(|p| field.to_grid(p)).collect();
+    let mut points = surface.damped_start(&thickened)?;
+    let mut solver = round::Solver::new(surface, field, iso, options)?;
+    let mut fitted = Fitted {
+        iso_volume,
+        ..Fitted::default()
+    };
+    for round in 0..options.rounds {
+        let part = f64::from(round) / f64::from(options.rounds);
+        monitor.step(STAGE, "rounds", 0.05 + 0.45 * part)?;
+        fitted.rounds.push(solver.round(&mut points, round)?);
+    }
+    let tangles = untangle::untangle(&mut solver, &mut points, &mut fitted, options, monitor)?;
+    let body = body.clone();
+    let mut state = refine::State {
+        body,
+        solver,
+        points,
+        tangles,
+    };
+    if state.tangles.sound() {
+        state = refine::refine(state, skeleton, &mut fitted, options, monitor)?;
+        settle::settle(&mut state, &fitted, options, monitor)?;
+    }
+    let refine::State {
+        body,
+        solver,
+        points,
+        tangles,
+    } = state;
+    let goal = Goal::of(options);
+    let figures = Figures::of(&solver, &points, iso_volume);
+    let (sound, error) = (tangles.sound(), goal.error(&figures));
+    fitted.self_intersections = tangles.places(&solver);
+    fitted.folds = tangles.folds(&solver, options.fold_limit);
+    monitor.step(STAGE, "distances", 0.97)?;
+    fitted.body_to_iso = solver.body_to_iso(&points);
+    fitted.iso_to_body = solver.iso_to_body(&points);
+    fitted.volume = solver.surface.volume(&points);
+    fitted.mesh = solver.surface.control_mesh(&points);
+    fitted.body = body;
+    Ok(Attempt {
+        met: sound && goal.met(&figures),
+        sound,
+        error,
+        fitted,
+    })
+}
