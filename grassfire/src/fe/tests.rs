@@ -48,6 +48,31 @@ fn uniform_cantilever_has_the_known_compliance() {
 }
 
 #[test]
+fn rigid_motions_of_an_element_need_no_forces() {
+    let k = element::stiffness(0.3);
+    let largest = k.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
+    let corner = |c: usize| [c & 1, c >> 1 & 1, c >> 2].map(|i| i as f64 - 0.5);
+    for motion in 0..6 {
+        let moved = |c: usize| -> [f64; 3] {
+            let (axis, x) = (motion % 3, corner(c));
+            let mut u = [0.0; 3];
+            if motion < 3 {
+                u[axis] = 1.0;
+            } else {
+                u[(axis + 1) % 3] = -x[(axis + 2) % 3];
+                u[(axis + 2) % 3] = x[(axis + 1) % 3];
+            }
+            u
+        };
+        let u: Vec<f64> = (0..8).flat_map(moved).collect();
+        for row in &k {
+            let force: f64 = row.iter().zip(&u).map(|(k, u)| k * u).sum();
+            assert!(force.abs() <= 1e-14 * largest, "{motion}: {force}");
+        }
+    }
+}
+
+#[test]
 fn uniaxial_patch_is_exact() {
     // 20 x 12 x 10 voxels under unit tension; symmetry supports.
     let dims = [20, 12, 10];

@@ -79,8 +79,9 @@ fn fitted(
     skeleton.stats = skeleton::stats(&skeleton.skeleton);
     let options = FitOptions {
         volume: Some(base.volume(target)),
-        // The body that grows was refined before.
+        // The body that grows was refined before, and starts from where it is.
         refinements: 0,
+        starts: 1,
         ..options.fit
     };
     let fitted = fit(&body, &skeleton.skeleton, target, &options, monitor)?;
