@@ -14,7 +14,8 @@ pub(super) struct Attempt {
     pub fitted: Fitted,
     /// It neither intersects itself nor folds, and is close everywhere.
     pub met: bool,
-    sound: bool,
+    /// It neither intersects itself nor folds.
+    pub sound: bool,
     error: f64,
 }
 

@@ -45,8 +45,8 @@ const MANY_QUADS: usize = 4000;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FitOptions {
-    /// Starts with nets of different evenness, at most; there is another one only if the last did not meet the goal and
-    /// the body has at most 2000 quads, and the best is kept.
+    /// Starts with nets of different evenness, at most; there is another one only if the last was sound but did not
+    /// meet the goal, and the body has at most 2000 quads; the best is kept.
     pub starts: u32,
     /// Gauss-Newton rounds against the iso-surface.
     pub rounds: u32,
@@ -288,7 +288,7 @@ impl FitError {
 /// 4. Refinement of bodies without trouble: strips of quads are split lengthwise where the mesh is too coarse. That makes no extraordinary points,
 ///    so that the number of faces does not grow with it.
 /// 5. Settling of these: a few rounds more, with little fairness and at the volume of f > 0.
-/// 6. If the goal is not met, all again with a net of other evenness; the best is kept.
+/// 6. If a sound body does not meet the goal, all again with a net of other evenness; the best is kept.
 ///
 /// From the ninth round on samples inside the proposal whose normals do not agree pull, too, under more fairness: they sit
 /// between walls of the body that nearly touch, and nothing else fills such slits. Around places farther off than a voxel
@@ -324,11 +324,12 @@ pub fn fit(
         };
         let tried = attempt::attempt(body, skeleton, field, &iso, iso_volume, &calmer, monitor)?;
         starts += 1;
-        let met = tried.met;
+        // Another start does not untangle a body; quads of another size do.
+        let ended = tried.met || !tried.sound;
         if best.as_ref().is_none_or(|best| tried.better_than(best)) {
             best = Some(tried);
         }
-        if met {
+        if ended {
             break;
         }
     }
