@@ -67,7 +67,7 @@ pub struct FitOptions {
     pub refinements: u32,
     /// Refined meshes have at most this many times the quads, or `few_quads`.
     pub most_quads: f64,
-    /// Refined meshes may always have this many quads: so few take no time.
+    /// Refined meshes may always have this many quads. More follow coarse parts more closely, and the voxels' noise, too.
     pub few_quads: u32,
     /// Refinement ends when the rms distance is below this, 95 % below twice and everything below eight times this,
     /// voxels.
@@ -98,7 +98,7 @@ impl Default for FitOptions {
             fold_limit: 0.05,
             refinements: 3,
             most_quads: 3.0,
-            few_quads: 1500,
+            few_quads: 0,
             goal: 0.15,
             settle_rounds: 6,
             volume: None,
