@@ -72,9 +72,6 @@ pub(super) fn attempt(
         points,
         tangles,
     } = state;
-    let goal = Goal::of(options);
-    let figures = Figures::of(&solver, &points, iso_volume);
-    let (sound, error) = (tangles.sound(), goal.error(&figures));
     fitted.self_intersections = tangles.places(&solver);
     fitted.folds = tangles.folds(&solver, options.fold_limit);
     monitor.step(STAGE, "distances", 0.97)?;
@@ -83,10 +80,14 @@ pub(super) fn attempt(
     fitted.volume = solver.surface.volume(&points);
     fitted.mesh = solver.surface.control_mesh(&points);
     fitted.body = body;
+    let goal = Goal::of(options);
+    let both = [fitted.body_to_iso, fitted.iso_to_body];
+    let figures = Figures::new(both, fitted.volume / iso_volume, field.spacing);
+    let sound = tangles.sound();
     Ok(Attempt {
         met: sound && goal.met(&figures),
         sound,
-        error,
+        error: goal.error(&figures),
         fitted,
     })
 }

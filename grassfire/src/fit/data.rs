@@ -30,6 +30,14 @@ pub(super) struct Nearby {
     pub far: bool,
 }
 
+/// Samples of the limit surface: places, outward normals and areas, in voxels.
+#[derive(Clone, Copy)]
+pub(super) struct Samples<'a> {
+    pub at: &'a [Vec3],
+    pub normals: &'a [Vec3],
+    pub areas: &'a [f64],
+}
+
 /// What each sample adds to the normal equations.
 struct Pulls {
     blocks: Vec<Matrix3<f64>>,
@@ -37,7 +45,7 @@ struct Pulls {
 }
 
 impl Pulls {
-    fn to_plane(&mut self, j: usize, weight: f64, normal: &Vec3, place: &Vec3) {
+    fn pull(&mut self, j: usize, weight: f64, normal: &Vec3, place: &Vec3) {
         let across = weight * normal * normal.transpose();
         self.blocks[j] += across;
         self.pulls[j] += across * place;
@@ -46,21 +54,16 @@ impl Pulls {
 
 impl Solver<'_> {
     /// Point-to-plane rows both ways and tangential damping; returns the area-weighted distance sum.
-    pub(super) fn add_data(
-        &mut self,
-        at: &[Vec3],
-        normals: &[Vec3],
-        areas: &[f64],
-        schedule: &Schedule,
-    ) -> f64 {
+    pub(super) fn add_data(&mut self, samples: Samples, schedule: &Schedule) -> f64 {
+        let count = samples.at.len();
         self.nearby.fill(Nearby::default());
         let mut data = Pulls {
-            blocks: vec![Matrix3::zeros(); at.len()],
-            pulls: vec![Vec3::zeros(); at.len()],
+            blocks: vec![Matrix3::zeros(); count],
+            pulls: vec![Vec3::zeros(); count],
         };
-        let sum = self.pull_to_iso(&mut data, at, normals, areas, schedule);
-        self.pull_from_iso(&mut data, at, normals, areas, schedule);
-        for j in 0..at.len() {
+        let sum = self.pull_to_iso(&mut data, samples, schedule);
+        self.pull_from_iso(&mut data, samples, schedule);
+        for j in 0..count {
             let (points, weights) = self.surface.samples.row(j);
             self.equations
                 .add(points, weights, &data.blocks[j], &data.pulls[j]);
@@ -72,14 +75,8 @@ impl Solver<'_> {
     ///
     /// Those that do not agree with the proposal's normal mostly flow to the wrong wall, and do not pull; but those inside
     /// the proposal, between walls of the body that nearly touch, have no other data, and pull outwards.
-    fn pull_to_iso(
-        &mut self,
-        data: &mut Pulls,
-        at: &[Vec3],
-        normals: &[Vec3],
-        areas: &[f64],
-        schedule: &Schedule,
-    ) -> f64 {
+    fn pull_to_iso(&mut self, data: &mut Pulls, samples: Samples, schedule: &Schedule) -> f64 {
+        let Samples { at, normals, areas } = samples;
         let flowed: Vec<(Vec3, Vec3)> = at
             .par_iter()
             .with_min_len(512)
@@ -94,9 +91,9 @@ impl Solver<'_> {
             let inside = (place - at[j]).dot(outward) > 0.0;
             if cosine >= AGREE {
                 let weight = self.trust[j] * weight * cosine.min(1.0);
-                data.to_plane(j, weight, outward, place);
+                data.pull(j, weight, outward, place);
             } else if schedule.sunk && inside && d > SUNK_DEPTH {
-                data.to_plane(j, SUNK_PULL * weight, outward, place);
+                data.pull(j, SUNK_PULL * weight, outward, place);
                 self.mark(j, AROUND_SUNK, |nearby| nearby.sunk = true);
             }
             if d > FAR {
@@ -110,14 +107,8 @@ impl Solver<'_> {
     }
 
     /// Samples of the iso-surface pull the nearest sample of the limit surface.
-    fn pull_from_iso(
-        &mut self,
-        data: &mut Pulls,
-        at: &[Vec3],
-        normals: &[Vec3],
-        areas: &[f64],
-        schedule: &Schedule,
-    ) {
+    fn pull_from_iso(&mut self, data: &mut Pulls, samples: Samples, schedule: &Schedule) {
+        let Samples { at, normals, areas } = samples;
         let share = areas.iter().sum::<f64>() / self.iso.points.len().max(1) as f64;
         let iso = self.iso;
         let nearest = nearest_samples(at, &iso.points);
@@ -127,7 +118,7 @@ impl Solver<'_> {
             let cosine = outward.dot(&normals[j]);
             if cosine > AGREE_ISO {
                 let weight = self.trust[j] * share * cosine * (schedule.cap / d.max(1e-9)).min(1.0);
-                data.to_plane(j, weight, outward, place);
+                data.pull(j, weight, outward, place);
             }
             if (place - at[j]).dot(&normals[j]).abs() > FAR {
                 self.mark(j, AROUND_FAR, |nearby| nearby.far = true);

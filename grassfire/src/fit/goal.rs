@@ -23,15 +23,21 @@ pub(super) struct Figures {
 
 impl Figures {
     pub fn of(solver: &Solver, points: &[Vec3], iso_volume: f64) -> Self {
-        let voxel = solver.field.spacing;
+        let both = [solver.body_to_iso(points), solver.iso_to_body(points)];
+        let volume = solver.surface.volume(points) / iso_volume;
+        Self::new(both, volume, solver.field.spacing)
+    }
+
+    /// From the distances in mm.
+    pub fn new(both: [Distances; 2], volume: f64, voxel: f64) -> Self {
         let scaled = |d: Distances| Distances {
             rms: d.rms / voxel,
             p95: d.p95 / voxel,
             max: d.max / voxel,
         };
         Self {
-            both: [solver.body_to_iso(points), solver.iso_to_body(points)].map(scaled),
-            volume: solver.surface.volume(points) / iso_volume,
+            both: both.map(scaled),
+            volume,
         }
     }
 

@@ -65,10 +65,8 @@ pub struct FitOptions {
     pub fold_limit: f64,
     /// Times that strips of quads are split where the mesh is too coarse for the proposal, at most; 0 keeps the quads.
     pub refinements: u32,
-    /// Refined meshes have at most this many times the quads, or `few_quads`.
+    /// Refined meshes have at most this many times the quads.
     pub most_quads: f64,
-    /// Refined meshes may always have this many quads. More follow coarse parts more closely, and the voxels' noise, too.
-    pub few_quads: u32,
     /// Refinement ends when the rms distance is below this, 95 % below twice and everything below eight times this,
     /// voxels.
     pub goal: f64,
@@ -98,7 +96,6 @@ impl Default for FitOptions {
             fold_limit: 0.05,
             refinements: 3,
             most_quads: 3.0,
-            few_quads: 0,
             goal: 0.15,
             settle_rounds: 6,
             volume: None,

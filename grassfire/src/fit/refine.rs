@@ -46,7 +46,6 @@ pub(super) fn refine<'a>(
     monitor: &Monitor,
 ) -> Result<State<'a>, FitError> {
     let first = state.body.mesh.quads.len() as f64;
-    let ceiling = (first * options.most_quads).max(f64::from(options.few_quads));
     let goal = Goal::of(options);
     let mut before = Figures::of(&state.solver, &state.points, fitted.iso_volume);
     for pass in 0..options.refinements {
@@ -58,7 +57,7 @@ pub(super) fn refine<'a>(
         // Where the surface is close on the whole, only single places count.
         let beyond = if goal.close(&before) { goal.max } else { 0.0 };
         let growth = f64::from(pass + 1) / f64::from(options.refinements);
-        let most = (first * (ceiling / first).powf(growth)) as usize;
+        let most = (first * options.most_quads.powf(growth)) as usize;
         let Some(mut finer) = finer(&state, skeleton, &goal, beyond, most)? else {
             break;
         };

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
-use super::data::{Nearby, nearest_samples};
+use super::data::{Nearby, Samples, nearest_samples};
 use super::equations::{Equations, solve};
 use super::surface::Surface;
 use super::targets::{IsoSamples, PointGrid, flow_to_surface};
@@ -85,7 +85,12 @@ impl<'a> Solver<'a> {
         let area: f64 = areas.iter().sum();
         let mean_area = area / points.len().max(1) as f64;
         self.equations.clear();
-        let distance = self.add_data(&at, &normals, &areas, &schedule);
+        let samples = Samples {
+            at: &at,
+            normals: &normals,
+            areas: &areas,
+        };
+        let distance = self.add_data(samples, &schedule);
         self.add_fairness(points, mean_area, schedule.fairness);
         self.add_evenness(&normals, mean_area);
         let solution = self
