@@ -97,7 +97,7 @@ fn simjeb_398_becomes_a_good_solid() {
 
 #[test]
 fn simjeb_576_becomes_a_good_solid() {
-    bracket("simjeb_576.obj", 13, 2.6);
+    bracket("simjeb_576.obj", 13, 1.5);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::{CadError, NonDesignOptions, array, primitives, rebuild};
 use crate::Vec3;
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
-use crate::non_design::Boss;
+use crate::non_design::{Boss, Notch};
 
 /// How exact the solid of a body is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,6 +51,12 @@ pub struct NonDesignBody {
 
 const STAGE: &str = "cad";
 const VOLUME_EPS: f64 = 1e-9;
+/// Triangles of a block whose corner k has the bits of k as its coordinates.
+#[rustfmt::skip]
+const PRISM: [[u32; 3]; 12] = [
+    [0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4],
+    [2, 6, 7], [2, 7, 3], [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5],
+];
 
 /// The solids of a STEP file, at least one.
 fn read_solids(path: &Path) -> Result<Vec<Shape>, CadError> {
@@ -157,7 +163,8 @@ pub fn from_shape(
     body(name, source, Rebuilt::Exact, solid, options, monitor)
 }
 
-/// Makes the sleeve of a recognised boss: a hollow cylinder, its bore kept free beyond the ends as far as the proposal is.
+/// Makes the sleeve of a recognised boss: a hollow cylinder, notched where the material ends before its outer wall, its bore
+/// kept free beyond the ends as far as the proposal is.
 ///
 /// # Errors
 /// [`CadError::Kernel`], [`CadError::InvalidSolid`].
@@ -170,7 +177,13 @@ pub fn from_boss(
 ) -> Result<NonDesignBody, CadError> {
     let ([from, to], [inner, outer]) = (boss.extent, [boss.radius, boss.outer_radius]);
     let profile = [[inner, from], [outer, from], [outer, to], [inner, to]];
-    let solid = Shape::revolve(array(boss.origin), array(boss.direction), &profile)?;
+    let mut solid = Shape::revolve(array(boss.origin), array(boss.direction), &profile)?;
+    for notch in &boss.notches {
+        let tool = notch_tool(boss, notch)?;
+        solid = solid
+            .boolean(Operation::Cut, &tool, 1e-6, false, &|| false)?
+            .shape;
+    }
     let options = NonDesignOptions {
         bore_extension: options.bore_extension.min(boss.free / boss.radius),
         ..options.clone()
@@ -179,6 +192,24 @@ pub fn from_boss(
         residual: boss.residual,
     };
     body(name.to_owned(), source, rebuilt, solid, &options, monitor)
+}
+
+/// What a notch takes away: a prism along the axis, as wide as the notch at every distance from the axis.
+fn notch_tool(boss: &Boss, notch: &Notch) -> Result<Shape, CadError> {
+    let [x, y] = primitives::across(&boss.direction);
+    let away = x * notch.turn.cos() + y * notch.turn.sin();
+    let aside = boss.direction.cross(&away);
+    let length = boss.extent[1] - boss.extent[0];
+    let far = 2.0 * boss.outer_radius;
+    let corner = |k: usize| {
+        let distance = if k & 1 == 0 { notch.distance } else { far };
+        let side = distance * notch.half_angle.tan();
+        let side = if k & 2 == 0 { -side } else { side };
+        let height = boss.extent[k >> 2] + if k & 4 == 0 { -length } else { length };
+        array(boss.origin + away * distance + aside * side + boss.direction * height)
+    };
+    let points: Vec<[f64; 3]> = (0..8).map(corner).collect();
+    Ok(Shape::from_triangles(&points, &PRISM)?.unified()?)
 }
 
 /// A design space: its faces as triangles, its solids, its bores.
@@ -326,5 +357,44 @@ fn fill(solid: &Shape, bores: &[Bore], volume: f64) -> Result<Shape, String> {
             Err(format!("volume {got:.6} instead of {total:.6} mm3"))
         }
         None => Ok(boss),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_notch_takes_its_share_of_the_sleeve() {
+        let [inner, outer, floor, half_angle]: [f64; 4] = [5.0, 9.0, 7.0, 0.4];
+        let mut boss = Boss {
+            bore: 0,
+            wall: Some(1),
+            ends: [None; 2],
+            origin: Vec3::new(1.0, 2.0, 3.0),
+            direction: Vec3::new(0.6, 0.0, 0.8),
+            radius: inner,
+            outer_radius: outer,
+            extent: [-2.0, 4.0],
+            notches: Vec::new(),
+            free: 5.0,
+            residual: 0.0,
+        };
+        let make = |boss: &Boss| {
+            let options = NonDesignOptions::default();
+            from_boss("boss", "test", boss, &options, &Monitor::default()).expect("a solid")
+        };
+        let whole = make(&boss).volume;
+        boss.notches = [0.3, 2.0]
+            .map(|turn| Notch {
+                turn,
+                half_angle,
+                distance: floor,
+            })
+            .to_vec();
+        let notched = make(&boss);
+        let area = outer * outer * half_angle - floor * floor * half_angle.tan();
+        assert!((whole - notched.volume - 2.0 * area * 6.0).abs() < 1e-9 * whole);
+        assert_eq!(notched.bores.len(), 1);
     }
 }

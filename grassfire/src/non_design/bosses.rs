@@ -2,6 +2,7 @@
 
 use super::RecogniseOptions;
 use super::facets::Facets;
+use super::notches::{Notch, notches};
 use super::ransac::Candidate;
 use crate::Vec3;
 use crate::cad::primitives::{Primitive, across};
@@ -26,6 +27,8 @@ pub struct Boss {
     pub outer_radius: f64,
     /// The sleeve's ends, mm along `direction` from `origin`.
     pub extent: [f64; 2],
+    /// Where the material ends before the outer wall; turns begin at [`across`] of `direction`.
+    pub notches: Vec<Notch>,
     /// How far the hole goes on free of material beyond its ends, mm; at most one radius is looked at.
     pub free: f64,
     /// Largest distance of the bore's points to its cylinder, mm.
@@ -35,6 +38,10 @@ pub struct Boss {
 /// Steps around the axis and along it in which walls are sampled.
 const AROUND: usize = 24;
 const ALONG: usize = 5;
+/// Directions in which an outer wall is looked for.
+const NOTCH_STEPS: usize = 72;
+/// An outer wall is missing where the material ends by more than this before it, edge lengths.
+const NOTCH_DEPTH: f64 = 1.5;
 /// Share of the directions in which the wall may end earlier: a notch does not shorten the whole bore.
 const NOTCH: f64 = 0.1;
 /// Share of the material around a bore that may be thinner than the thickness a sleeve is made from.
@@ -51,8 +58,8 @@ const MIN_BULGE: f64 = 5.0;
 ///
 /// 1. A bore is a concave cylinder around most of its circumference with nothing inside, open at both ends.
 /// 2. Its ends: where the wall ends in nearly all directions; moved onto a flat face across the axis close by.
-/// 3. Its outer wall: the smallest concentric convex cylinder. Without one: a sleeve that takes a share of the material
-///    around the bore, measured by rays away from the axis.
+/// 3. Its outer wall: the smallest concentric convex cylinder, with notches where the material ends before it. Without one:
+///    a sleeve that takes a share of the material around the bore, measured by rays away from the axis.
 pub fn bosses(
     mesh: &crate::mesh::TriMesh,
     candidates: &[Candidate],
@@ -170,10 +177,12 @@ impl Scene<'_> {
         {
             return Err("it is closed at one end".into());
         }
-        let wall = self.wall(&axis, extent);
-        let outer_radius = match wall {
-            Some((_, radius)) => radius,
-            None => self.sleeve(&axis, wall_extent)?,
+        let wall = self.wall(&axis, extent).and_then(|(wall, radius)| {
+            Some((wall, radius, self.notches(&axis, wall_extent, radius)?))
+        });
+        let (wall, outer_radius, notches) = match wall {
+            Some((wall, radius, notches)) => (Some(wall), radius, notches),
+            None => (None, self.sleeve(&axis, wall_extent)?, Vec::new()),
         };
         if outer_radius - radius < MIN_SLEEVE * radius {
             return Err(format!(
@@ -183,13 +192,14 @@ impl Scene<'_> {
         }
         Ok(Boss {
             bore,
-            wall: wall.map(|(i, _)| i),
+            wall,
             ends,
             origin,
             direction,
             radius,
             outer_radius,
             extent,
+            notches,
             free: self.free(&axis, extent),
             residual: candidate.residual,
         })
@@ -310,22 +320,26 @@ impl Scene<'_> {
         best
     }
 
+    /// Where the outer wall of this radius is missing; `None` when that is too much of it.
+    fn notches(&self, axis: &Axis, wall: [f64; 2], radius: f64) -> Option<Vec<Notch>> {
+        let most = radius - axis.radius;
+        let reach = (0..NOTCH_STEPS).map(|k| {
+            let turn = std::f64::consts::TAU * k as f64 / NOTCH_STEPS as f64;
+            let mut depths = self.depths(axis, wall, turn, most);
+            depths.sort_by(f64::total_cmp);
+            axis.radius + depths[ALONG / 2]
+        });
+        let reach: Vec<f64> = reach.collect();
+        notches(&reach, radius - NOTCH_DEPTH * self.facets.edge)
+    }
+
     /// Outer radius of a sleeve inside the material around the bore.
     fn sleeve(&self, axis: &Axis, wall: [f64; 2]) -> Result<f64, String> {
-        let start = axis.radius + 0.02 * axis.radius;
-        let mut depths = Vec::with_capacity(AROUND * ALONG);
-        for step in 0..ALONG {
-            let t = wall[0] + (wall[1] - wall[0]) * (step as f64 + 0.5) / ALONG as f64;
-            for k in 0..AROUND {
-                let turn = std::f64::consts::TAU * (k as f64 + 0.3) / AROUND as f64;
-                let from = axis.at(t, turn, start);
-                if self.winding.at(&from) > 0.5 {
-                    let most = axis.radius;
-                    let hit = self.bvh.first_hit(&from, &axis.away(turn), 0.0, most);
-                    depths.push(start - axis.radius + hit.map_or(most, |h| h.0));
-                }
-            }
-        }
+        let turns = (0..AROUND).map(|k| std::f64::consts::TAU * (k as f64 + 0.3) / AROUND as f64);
+        let mut depths: Vec<f64> = turns
+            .flat_map(|turn| self.depths(axis, wall, turn, axis.radius))
+            .filter(|depth| *depth > 0.0)
+            .collect();
         depths.sort_by(f64::total_cmp);
         let thickness = depths.get((THIN * depths.len() as f64) as usize);
         match thickness {
@@ -334,6 +348,20 @@ impl Scene<'_> {
             }
             _ => Err("there is no material around it".into()),
         }
+    }
+
+    /// Thickness of the material around the bore in one direction, at most `most` mm, at several heights; 0 for none.
+    fn depths(&self, axis: &Axis, wall: [f64; 2], turn: f64, most: f64) -> [f64; ALONG] {
+        let start = axis.radius + 0.02 * axis.radius;
+        std::array::from_fn(|step| {
+            let t = wall[0] + (wall[1] - wall[0]) * (step as f64 + 0.5) / ALONG as f64;
+            let from = axis.at(t, turn, start);
+            if self.winding.at(&from) <= 0.5 {
+                return 0.0;
+            }
+            let hit = self.bvh.first_hit(&from, &axis.away(turn), 0.0, most);
+            start - axis.radius + hit.map_or(most, |h| h.0)
+        })
     }
 
     /// How far beyond both ends the hole goes on free, at most one radius.

@@ -8,12 +8,14 @@
 mod bosses;
 mod domain;
 mod facets;
+mod notches;
 mod options;
 mod ransac;
 mod recognise;
 
 pub use bosses::{Boss, bosses};
 pub use domain::{FaceCoverage, coverage, sleeves};
+pub use notches::Notch;
 pub use options::{DomainOptions, RecogniseMode, RecogniseOptions};
 pub use ransac::{Candidate, surfaces};
 pub use recognise::{Recognised, recognise};
