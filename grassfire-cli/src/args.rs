@@ -139,6 +139,9 @@ pub struct ReconstructArgs {
     /// Edge of a voxel, mm (remesh.voxel)
     #[arg(long, value_name = "MM", value_parser = positive, allow_negative_numbers = true)]
     pub voxel: Option<f64>,
+    /// Flat faces whose border turns by at least this become exactly plane with sharp edges, degrees (flats.crease_angle)
+    #[arg(long, value_name = "DEG", value_parser = positive, allow_negative_numbers = true)]
+    pub crease_angle: Option<f64>,
     /// Edge of a skeleton quad, mm (skeleton.quad_size)
     #[arg(long, value_name = "MM", value_parser = positive, allow_negative_numbers = true)]
     pub quad_size: Option<f64>,

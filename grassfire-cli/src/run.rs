@@ -24,6 +24,10 @@ pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
     let mut short = Vec::new();
     short.extend(args.voxel.map(|mm| ("remesh.voxel", mm.to_string())));
     short.extend(
+        args.crease_angle
+            .map(|degrees| ("flats.crease_angle", degrees.to_string())),
+    );
+    short.extend(
         args.quad_size
             .map(|mm| ("skeleton.quad_size", mm.to_string())),
     );

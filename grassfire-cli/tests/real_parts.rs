@@ -115,6 +115,63 @@ fn strap_becomes_a_good_solid_and_every_closed_tunnel_is_named() {
     assert_eq!(report["solid"]["genus"].as_i64(), Some(3 - closed as i64));
 }
 
+/// Area of the part's triangles that lie on a plane with this outward normal, mm2.
+fn area_on(run: &Run, normal: [f64; 3], place: [f64; 3]) -> f64 {
+    let stl = run.file("part.stl");
+    let number = |at: usize| {
+        f64::from(f32::from_le_bytes(
+            stl[at..at + 4].try_into().expect("four"),
+        ))
+    };
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let minus = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    let mut area = 0.0;
+    for triangle in (84..stl.len()).step_by(50) {
+        let corner = |k: usize| [0, 1, 2].map(|d| number(triangle + 12 + 12 * k + 4 * d));
+        let [a, b, c] = [corner(0), corner(1), corner(2)];
+        // The file holds single precision.
+        if [a, b, c]
+            .iter()
+            .all(|p| dot(minus(*p, place), normal).abs() < 1e-4)
+        {
+            let (u, v) = (minus(b, a), minus(c, a));
+            let cross = [
+                u[1] * v[2] - u[2] * v[1],
+                u[2] * v[0] - u[0] * v[2],
+                u[0] * v[1] - u[1] * v[0],
+            ];
+            area += dot(cross, normal) / 2.0;
+        }
+    }
+    area
+}
+
+#[test]
+fn mounting_faces_become_exactly_plane_on_request() {
+    // The rings of the bracket end on its base, the strap is flat on most sides.
+    for (name, least) in [("abc_00000125_strap.obj", 7), ("simjeb_576.obj", 4)] {
+        let Some((_folder, run)) = run(name, &["--crease-angle", "30"]) else {
+            return;
+        };
+        let report = must_be_good(&run);
+        let all = report["flats"].as_array().expect("flat faces");
+        let plane: Vec<&Value> = all.iter().filter(|flat| flat["plane"] == true).collect();
+        assert!(plane.len() >= least, "{all:?}");
+        for flat in plane {
+            let vector = |key: &str| [0, 1, 2].map(|d| number(flat, &format!("/{key}/{d}")));
+            let area = area_on(&run, vector("normal"), vector("place"));
+            let proposal = number(flat, "/area");
+            assert!(
+                area > 0.85 * proposal && area < 1.5 * proposal,
+                "{area} {flat}"
+            );
+        }
+        for flat in all.iter().filter(|flat| flat["plane"] == false) {
+            assert!(flat["reason"].is_string(), "{flat}");
+        }
+    }
+}
+
 #[test]
 fn rings_stay_in_the_bracket_as_given() {
     let Some(corpus) = corpus() else { return };

@@ -51,6 +51,7 @@ use crate::io::ReadOptions;
 use crate::medial::{self, MedialOptions, PoleOptions};
 use crate::mesh::{RepairOptions, TriMesh};
 use crate::monitor::Monitor;
+use crate::non_design::FlatOptions;
 use crate::radii::RadiiOptions;
 use crate::remesh::{CutOutOptions, RemeshOptions, WrapOptions};
 use crate::report::{Picture, Report, ReportOptions};
@@ -72,6 +73,8 @@ pub struct ReconstructOptions {
     pub read: ReadOptions,
     /// Reading and rebuilding of the non-design bodies.
     pub non_design: NonDesignOptions,
+    /// Flat faces that become exactly plane.
+    pub flats: FlatOptions,
     /// Repair of the input mesh.
     pub repair: RepairOptions,
     /// Voxel remesh and topological noise.
@@ -302,6 +305,7 @@ fn rebuild(
         solid.faces_deviation = shape.faces_deviation;
     }
     record.report.non_design = part.non_design.clone();
+    record.report.flats = part.flats.clone();
     let added = remeshed.solid.volume() - original.solid.volume();
     let feeders = feeding::poured(record, part.volume, added);
     record.report.refused = record.stage("write", || {

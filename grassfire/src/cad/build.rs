@@ -21,6 +21,8 @@ pub enum FaceSource {
     Body(u32),
     /// The wall of bore `.1` of non-design body `.0`.
     Bore(u32, u32),
+    /// Cut plane at flat face `.0` of the proposal.
+    Flat(u32),
 }
 
 /// The finished part with everything that was checked on it.

@@ -1,6 +1,6 @@
 //! Everything that the report says about the finished part.
 
-use grassfire_occt::{Edge, Face, OcctError, Shape};
+use grassfire_occt::{Counts, Edge, Face, OcctError, Shape};
 use serde::Serialize;
 
 use super::bores::{Bore, ON_WALL};
@@ -190,19 +190,8 @@ pub(crate) fn report(
             shape.volume(1e-8)?
         }
     };
-    let euler = i64::from(counts.vertices) - i64::from(counts.edges) + 2 * i64::from(counts.faces)
-        - i64::from(counts.wires);
-    let mut g1_max = 0.0f64;
     let edges = shape.edges()?;
-    for edge in &edges {
-        let smooth = |f: u32| sources.get(f as usize) == Some(&FaceSource::Organic);
-        if let (Some([a, b]), Some(angle)) = (edge.faces, edge.angle)
-            && smooth(a)
-            && smooth(b)
-        {
-            g1_max = g1_max.max(angle.to_degrees());
-        }
-    }
+    let g1_max = kink(&edges, &sources);
     monitor.check()?;
     let mut non_design = Vec::with_capacity(context.bodies.len());
     let faces = shape.faces()?;
@@ -241,7 +230,7 @@ pub(crate) fn report(
         faces: counts.faces as usize,
         volume,
         area: faces.iter().map(|face| face.area).sum(),
-        genus: i64::from(counts.shells) - euler / 2,
+        genus: genus(&counts),
         g1_max,
         shortest_edge: shortest(&edges).unwrap_or(0.0),
         max_tolerance: shape.max_tolerance()?,
@@ -251,6 +240,65 @@ pub(crate) fn report(
         messages,
         shape,
     })
+}
+
+/// Measures a part anew after cuts of which each was checked: `shape` of `volume` mm3 with one source a face.
+pub(crate) fn again(
+    before: &CadSolid,
+    shape: Shape,
+    sources: Vec<FaceSource>,
+    volume: f64,
+    bodies: &[NonDesignBody],
+    options: &CadOptions,
+) -> Result<CadSolid, CadError> {
+    let context = Context {
+        bodies,
+        options,
+        probes: &[],
+        reference: volume,
+    };
+    let (edges, faces, counts) = (shape.edges()?, shape.faces()?, shape.counts()?);
+    let open = bores_open(&shape, bodies)?;
+    let mut non_design = Vec::with_capacity(bodies.len());
+    for (b, old) in before.non_design.iter().enumerate() {
+        let mut result = united(&shape, &faces, &sources, b, open[b], &context)?;
+        result.bores.clone_from(&old.bores);
+        non_design.push(result);
+    }
+    Ok(CadSolid {
+        valid: before.valid,
+        organic: before.organic.share()?,
+        bodies: counts.solids as usize,
+        faces: counts.faces as usize,
+        volume,
+        area: faces.iter().map(|face| face.area).sum(),
+        genus: genus(&counts),
+        g1_max: kink(&edges, &sources),
+        shortest_edge: shortest(&edges).unwrap_or(0.0),
+        max_tolerance: shape.max_tolerance()?,
+        volume_check: before.volume_check,
+        non_design,
+        sources,
+        messages: before.messages.clone(),
+        shape,
+    })
+}
+
+/// Sum of the genus of all shells.
+pub(super) fn genus(counts: &Counts) -> i64 {
+    let euler = i64::from(counts.vertices) - i64::from(counts.edges) + 2 * i64::from(counts.faces)
+        - i64::from(counts.wires);
+    i64::from(counts.shells) - euler / 2
+}
+
+/// Largest angle between the normals of two faces of the fitted body at their common edge, degrees.
+fn kink(edges: &[Edge], sources: &[FaceSource]) -> f64 {
+    let smooth = |f: u32| sources.get(f as usize) == Some(&FaceSource::Organic);
+    let angle = |edge: &Edge| match (edge.faces, edge.angle) {
+        (Some([a, b]), Some(angle)) if smooth(a) && smooth(b) => angle.to_degrees(),
+        _ => 0.0,
+    };
+    edges.iter().map(angle).fold(0.0, f64::max)
 }
 
 /// Length of the shortest edge, mm.

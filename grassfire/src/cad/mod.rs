@@ -3,7 +3,8 @@
 //! 1. [`read`] (STEP) or [`from_mesh`] make exact [`NonDesignBody`]s and find their bores.
 //! 2. [`build`] makes the body's B-rep directly (shared edges, exact pcurves, no sewing), fuses the non-design bodies with
 //!    their bores filled, cuts the bores last, and checks every step with volumes that do not come from the CAD kernel.
-//! 3. [`write_step`], [`write_brep`], [`write_iges`], [`write_pieces`], [`write_casting`] and [`tessellate`] give the files.
+//! 3. [`trim`] cuts it plane where that is asked for.
+//! 4. [`write_step`], [`write_brep`], [`write_iges`], [`write_pieces`], [`write_casting`] and [`tessellate`] give the files.
 //!
 //! Without the feature `occt` only the options, the error and the recognition of surfaces in meshes ([`primitives`]) are here.
 
@@ -38,6 +39,8 @@ mod shells;
 #[cfg(feature = "occt")]
 mod split;
 #[cfg(feature = "occt")]
+mod trim;
+#[cfg(feature = "occt")]
 mod unite;
 
 pub use error::CadError;
@@ -57,6 +60,7 @@ pub use {
         ORGANIC_PIECE, piece_name, tessellate, tessellate_solids, write_brep, write_iges,
         write_pieces, write_step,
     },
+    trim::trim,
 };
 
 #[cfg(feature = "occt")]

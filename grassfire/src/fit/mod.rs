@@ -6,6 +6,7 @@ mod data;
 mod equations;
 mod goal;
 mod guard;
+mod raise;
 mod refine;
 mod residual;
 mod round;
@@ -18,6 +19,7 @@ mod untangle;
 mod volume;
 
 pub use clearance::clear_of;
+pub use raise::raised;
 pub use volume::volume;
 
 use schemars::JsonSchema;

@@ -81,3 +81,32 @@ impl Default for DomainOptions {
         }
     }
 }
+
+/// Which flat faces of the proposal become exactly plane.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct FlatOptions {
+    /// Flat faces whose border turns by at least this become exactly plane with sharp edges, degrees; none: all faces stay
+    /// smooth.
+    pub crease_angle: Option<f64>,
+    /// Share of the border that must be as sharp as that.
+    pub min_sharp: f64,
+    /// Smallest face, squared voxels.
+    pub min_area: f64,
+    /// The fitted body bulges this far over the plane before it is cut there, voxels: more gives sharper edges.
+    pub raise: f64,
+    /// What bulges at most this far is cut off, voxels.
+    pub height: f64,
+}
+
+impl Default for FlatOptions {
+    fn default() -> Self {
+        Self {
+            crease_angle: None,
+            min_sharp: 0.6,
+            min_area: 100.0,
+            raise: 0.5,
+            height: 4.0,
+        }
+    }
+}

@@ -11,7 +11,9 @@ use crate::cad::{self, NonDesignBody};
 use crate::io::{self, Input};
 use crate::mesh::{Bvh, TriMesh};
 use crate::monitor::Monitor;
+use crate::non_design::Flats;
 use crate::remesh::{Bosses, Capsule};
+use crate::report::FlatBlock;
 #[cfg(feature = "occt")]
 use grassfire_occt::Triangulation;
 
@@ -31,6 +33,8 @@ pub(super) struct Bodies {
     pub(super) surface: TriMesh,
     /// The same with their bores filled, as cutting and fitting see them.
     pub(super) bosses: Bosses,
+    /// Flat faces of the proposal that become exactly plane.
+    pub(super) flats: Flats,
     /// Nobody gave them: the part may be made without them.
     #[cfg_attr(
         not(feature = "occt"),
@@ -93,8 +97,47 @@ impl Bodies {
     pub(super) fn drop_recognised(&mut self, monitor: &Monitor) {
         if self.recognised {
             monitor.warn("cad", "the body is wrapped around the part or cuts itself: recognised bores and bosses are listed, not united; give them with --non-design to have them exact".to_owned());
-            *self = Self::default();
+            self.forget();
         }
+    }
+}
+
+impl Bodies {
+    /// Whether a flat face could not be cut though it bulges.
+    pub(super) fn refuses_flats(&self, blocks: &[FlatBlock]) -> bool {
+        let mut both = self.flats.faces.iter().zip(blocks);
+        both.any(|(flat, block)| flat.reason.is_none() && block.reason.is_some())
+    }
+
+    /// Gives up flat faces that could not be cut; whether there were some.
+    pub(super) fn refuse_flats(&mut self, blocks: &[FlatBlock]) -> bool {
+        let refused = self.refuses_flats(blocks);
+        for (flat, block) in self.flats.faces.iter_mut().zip(blocks) {
+            flat.reason.clone_from(&block.reason);
+        }
+        let Flats { faces, surface } = &mut self.flats;
+        let keep = |t: &usize| faces[surface.tags[*t] as usize].reason.is_none();
+        let kept: Vec<usize> = (0..surface.triangles.len()).filter(keep).collect();
+        surface.triangles = kept.iter().map(|&t| surface.triangles[t]).collect();
+        surface.tags = kept.iter().map(|&t| surface.tags[t]).collect();
+        refused
+    }
+
+    /// Gives up all flat faces that are left.
+    pub(super) fn refuse_all_flats(&mut self, reason: &str) {
+        let Flats { faces, surface } = &mut self.flats;
+        for flat in faces.iter_mut().filter(|flat| flat.reason.is_none()) {
+            flat.reason = Some(reason.to_owned());
+        }
+        *surface = TriMesh::default();
+    }
+
+    /// No bodies any more; the flat faces stay.
+    pub(super) fn forget(&mut self) {
+        *self = Self {
+            flats: std::mem::take(&mut self.flats),
+            ..Self::default()
+        };
     }
 }
 

@@ -9,13 +9,16 @@ use super::record::Record;
 use super::shape::{self, Base, Shape};
 use super::union::{self, Part};
 use super::{ReconstructOptions, measure};
-use crate::fit::clear_of;
+use crate::fit::{clear_of, raised};
 use crate::medial::{self, MedialAxis};
 use crate::mesh::Distance;
 use crate::monitor::Monitor;
 use crate::remesh::{DesignPart, Remeshed, cut_out};
 use crate::skeleton::Skeleton;
 use crate::topology::Betti;
+
+/// Times that a part is made without the bulges of flat faces that could not be cut.
+const FLAT_ROUNDS: usize = 3;
 
 /// What every way of making the part starts from.
 pub(super) struct Site<'a> {
@@ -77,7 +80,23 @@ impl<'a> Site<'a> {
     /// 2. When that gives no sound body or no valid union with the proposal's topology, or there are no bodies, the
     ///    proposal is made as a whole; the body ends inside the walls of given bodies then. Recognised ones are left out
     ///    when no union with them is valid.
+    /// 3. Where flat faces could not be cut plane, all is made once more without their bulge.
     pub(super) fn build(&mut self) -> Result<Made, PipelineError> {
+        for _ in 0..FLAT_ROUNDS {
+            let made = self.build_once()?;
+            if !self.bodies.refuse_flats(&made.part.flats) {
+                return Ok(made);
+            }
+            self.monitor.warn(
+                "cad",
+                "flat faces could not be cut plane: the part is made once more, smooth there",
+            );
+        }
+        self.bodies.refuse_all_flats("cuts failed again and again");
+        self.build_once()
+    }
+
+    fn build_once(&mut self) -> Result<Made, PipelineError> {
         match self.without_bodies() {
             Ok(Some(made)) => return Ok(made),
             Ok(None) => {}
@@ -127,9 +146,11 @@ impl<'a> Site<'a> {
         self.record.stage("write", || {
             delivery.stl("design_part.stl", part.solid.mesh())
         })?;
+        let rise = options.flats.raise * remeshed.field.spacing;
+        let target = raised(&part.field, &self.bodies.flats, rise);
         let base = Base {
             remeshed: &part,
-            target: &part.field,
+            target: &target,
             united: Some(wanted),
             lost,
         };
@@ -145,6 +166,16 @@ impl<'a> Site<'a> {
             union::united(&surface, joined, bodies, 0, voxel, options, monitor)
         })?;
         part.tell(monitor);
+        if self.bodies.refuses_flats(&part.flats) {
+            // It bulges there: no use in judging it.
+            let distance = self.distance(&part)?;
+            return Ok(Some(Made {
+                axis,
+                shape,
+                part,
+                distance,
+            }));
+        }
         if let Some(problem) = part.problem(&wanted) {
             self.give_up(&problem);
             return Ok(None);
@@ -200,12 +231,14 @@ impl<'a> Site<'a> {
         let bodies = &*self.bodies;
         let target = self.record.stage("fit", || {
             let depth = options.non_design.clearance * voxel;
-            Ok::<_, StageError>(if bodies.recognised {
+            let clear = if bodies.recognised {
                 // They are made from the proposal's own walls, too thin for a body to end inside them.
                 remeshed.field.clone()
             } else {
                 clear_of(&remeshed.field, &bodies.bosses, depth)
-            })
+            };
+            let rise = options.flats.raise * voxel;
+            Ok::<_, StageError>(raised(&clear, &bodies.flats, rise))
         })?;
         let base = Base {
             remeshed,

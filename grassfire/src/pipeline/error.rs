@@ -114,6 +114,8 @@ pub enum StageError {
         super::exchange::MIN_CHORD
     )]
     Chord { chord: f64 },
+    #[error("flats.crease_angle is {angle} degrees; more than 0 and less than 180 wanted")]
+    CreaseAngle { angle: f64 },
     #[error("the triangles of {name} do not close: {source}")]
     Open { name: String, source: SolidError },
 }
@@ -183,6 +185,9 @@ impl PipelineError {
             StageError::Format { .. } => Some("build with the default feature occt".into()),
             StageError::Chord { .. } => {
                 Some("leave it out, or give a length such as files.chord=0.02".into())
+            }
+            StageError::CreaseAngle { .. } => {
+                Some("leave it out, or give an angle such as flats.crease_angle=40".into())
             }
             StageError::Growth { .. } => Some("less feed.growth asks for less metal".into()),
             StageError::NoFeeders => Some("give one with --feeder x,y,z".into()),

@@ -86,6 +86,11 @@ pub(super) fn check(options: &ReconstructOptions) -> Result<(), StageError> {
     if files.formats.contains(&Format::Casting) && options.feed.feeders.is_empty() {
         return Err(StageError::NoFeeders);
     }
+    if let Some(angle) = options.flats.crease_angle
+        && !(angle > 0.0 && angle < 180.0)
+    {
+        return Err(StageError::CreaseAngle { angle });
+    }
     match files.chord {
         Some(chord) if !(chord.is_finite() && chord >= MIN_CHORD) => {
             Err(StageError::Chord { chord })

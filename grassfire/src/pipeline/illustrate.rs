@@ -9,9 +9,12 @@ use super::union::Part;
 use crate::medial::{MedialAxis, Poles};
 use crate::mesh::Bvh;
 use crate::monitor::Monitor;
-use crate::remesh::Remeshed;
+use crate::remesh::{Remeshed, split_long_edges};
 use crate::report::render::{RenderError, pictures::Studio};
 use crate::report::{Picture, ReportError, ReportOptions};
+
+/// Edge of the triangles that carry the colours of the deviation, voxels.
+const PIECE: f64 = 3.0;
 
 type Shot<'a> = Box<dyn Fn(&Studio) -> Result<Picture, RenderError> + Sync + 'a>;
 
@@ -45,7 +48,9 @@ pub(super) fn pictures(
     monitor.step("pictures", "drawing", 0.0)?;
     let proposal = remeshed.solid.mesh();
     let studio = Studio::new(&proposal.points, options.picture_size());
-    let voxels = deviation(remeshed, part, non_design);
+    // Plane faces have few triangles: colours between their corners would tell of the corners only.
+    let fine = split_long_edges(&part.mesh, PIECE * remeshed.field.spacing);
+    let voxels = deviation(remeshed, &fine.points, non_design);
     let bodies: Vec<u32> = (1..=part.non_design.len() as u32).collect();
     let shots: Vec<Shot> = vec![
         Box::new(|studio| studio.proposal(proposal)),
@@ -54,17 +59,17 @@ pub(super) fn pictures(
         Box::new(|studio| studio.skeleton(&shape.skeleton.skeleton)),
         Box::new(|studio| studio.body(&shape.fitted.mesh)),
         Box::new(|studio| studio.solid(&part.mesh, &bodies)),
-        Box::new(|studio| studio.error(&part.mesh, &voxels)),
+        Box::new(|studio| studio.error(&fine, &voxels)),
     ];
     let drawn: Result<Vec<Picture>, RenderError> =
         shots.par_iter().map(|shot| shot(&studio)).collect();
     Ok(drawn.map_err(ReportError::from)?)
 }
 
-/// Signed distance of every point of the part to the proposal, voxels; positive outside.
+/// Signed distance of points of the part to the proposal, voxels; positive outside.
 ///
 /// NaN near non-design bodies, where the proposal is not the reference: drawn grey.
-fn deviation(remeshed: &Remeshed, part: &Part, non_design: &Bodies) -> Vec<f64> {
+fn deviation(remeshed: &Remeshed, points: &[crate::Vec3], non_design: &Bodies) -> Vec<f64> {
     let field = &remeshed.field;
     let nearest = Bvh::new(remeshed.solid.mesh());
     let region = non_design.region(REGION_MARGIN * field.spacing);
@@ -77,5 +82,5 @@ fn deviation(remeshed: &Remeshed, part: &Part, non_design: &Bodies) -> Vec<f64> 
             .map_or(0.0, |hit| hit.distance);
         -distance.copysign(field.sample(p)) / field.spacing
     };
-    part.mesh.points.par_iter().map(signed).collect()
+    points.par_iter().map(signed).collect()
 }

@@ -9,12 +9,13 @@ use crate::cad::primitives::Primitive;
 use crate::cad::{self, CadError, NonDesignBody};
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
-use crate::non_design::{self, Boss, Candidate, RecogniseMode, Recognised};
-#[cfg(feature = "occt")]
+use crate::non_design::{self, Boss, Candidate, Flats, RecogniseMode, Recognised};
 use crate::remesh::default_voxel;
 use crate::report::{CandidateBlock, DesignFaceBlock};
 
 const STAGE: &str = "recognise";
+/// A boss or a body ends on a flat face when it does within this many voxels.
+const SAME_PLANE: f64 = 0.05;
 /// A hollow that turns by more than this is worth a word why it is no boss, radians.
 const HALF_TURN: f64 = std::f64::consts::PI;
 
@@ -28,7 +29,7 @@ pub(super) struct Found {
 /// Recognises non-design bodies and adds those that are to be united to `bodies`.
 ///
 /// 1. Nothing when `non_design.recognise` is off and there is no design space.
-/// 2. Planes, cylinders and bosses of the proposal.
+/// 2. Planes, cylinders and bosses of the proposal; with a crease angle the flat faces that become exactly plane.
 /// 3. With a design space: its covered faces, its covered solids, and only the bosses on its bores, with its radii.
 /// 4. `auto` without given bodies: the solids and bosses are united with the part.
 pub(super) fn recognise(
@@ -39,14 +40,15 @@ pub(super) fn recognise(
 ) -> Result<Found, StageError> {
     let options = &job.options;
     let mode = options.non_design.recognise;
-    if mode == RecogniseMode::Off && job.design_space.is_none() {
+    let creased = options.flats.crease_angle.is_some();
+    if mode == RecogniseMode::Off && job.design_space.is_none() && !creased {
         return Ok(Found::default());
     }
     let Proposal::Mesh { mesh, .. } = proposal else {
-        if mode == RecogniseMode::Auto || job.design_space.is_some() {
+        if mode == RecogniseMode::Auto || job.design_space.is_some() || creased {
             monitor.warn(
                 STAGE,
-                "non-design bodies are recognised in meshes only, not in densities",
+                "non-design bodies and flat faces are recognised in meshes only, not in densities",
             );
         }
         return Ok(Found::default());
@@ -55,6 +57,12 @@ pub(super) fn recognise(
     let unite = mode == RecogniseMode::Auto && job.non_design.is_empty() && job.bodies.is_empty();
     let mut found = Found::default();
     let mut bosses = recognised.bosses.clone();
+    bodies.flats = flat_faces(mesh, &recognised, options, monitor);
+    let tolerance = SAME_PLANE * voxel(mesh, options);
+    bodies.flats.adopt_planes(&bodies.surface, tolerance);
+    for boss in &mut bosses {
+        bodies.flats.end_on(boss, tolerance);
+    }
     if let Some(path) = &job.design_space {
         let space = design_space(path, mesh, options, monitor)?;
         bosses = space.bosses(&bosses);
@@ -72,6 +80,32 @@ pub(super) fn recognise(
     let listed = options.non_design.recognition.max_listed;
     found.candidates = table(&recognised, &united, unite, listed);
     Ok(found)
+}
+
+/// The flat faces that become exactly plane; none where an edit moves the surface.
+fn flat_faces(
+    mesh: &TriMesh,
+    recognised: &Recognised,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Flats {
+    if options.flats.crease_angle.is_none() {
+        return Flats::default();
+    }
+    if !options.edits.is_empty()
+        || !options.feed.feeders.is_empty()
+        || options.mould.draw.is_some() && options.mould.repairs()
+    {
+        monitor.warn(STAGE, "flat faces are not cut plane, because edits, feeders or a draw repair move the surface");
+        return Flats::default();
+    }
+    let voxel = voxel(mesh, options);
+    non_design::flats(mesh, &recognised.candidates, voxel, &options.flats)
+}
+
+fn voxel(mesh: &TriMesh, options: &ReconstructOptions) -> f64 {
+    let given = options.remesh.voxel;
+    given.unwrap_or_else(|| default_voxel(mesh, &options.remesh))
 }
 
 /// Makes the bosses solid; gives the bores of those that became bodies.
@@ -185,11 +219,7 @@ fn design_space(
         });
     }
     let matching = &options.non_design.design_space;
-    let voxel = options
-        .remesh
-        .voxel
-        .unwrap_or_else(|| default_voxel(mesh, &options.remesh));
-    let tolerance = matching.tolerance * voxel;
+    let tolerance = matching.tolerance * voxel(mesh, options);
     let space = cad::read_design_space(path, 0.1 * tolerance)?;
     super::bodies::check_unit(&space.faces, mesh.bounds())?;
     let faces = non_design::coverage(&space.faces, mesh, tolerance, matching, monitor)?;

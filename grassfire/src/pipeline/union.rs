@@ -11,8 +11,10 @@ use crate::cad::{self, CadSolid, NonDesignResult};
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
 #[cfg(feature = "occt")]
+use crate::non_design::Flat;
+#[cfg(feature = "occt")]
 use crate::report::BoreBlock;
-use crate::report::{NonDesignBlock, SolidBlock};
+use crate::report::{FlatBlock, NonDesignBlock, SolidBlock};
 #[cfg(not(feature = "occt"))]
 use crate::spline::Crowded;
 use crate::topology::Betti;
@@ -31,6 +33,8 @@ pub(super) struct Part {
     pub(super) block: Option<SolidBlock>,
     /// Report entries of the non-design bodies.
     pub(super) non_design: Vec<NonDesignBlock>,
+    /// Report entries of the flat faces.
+    pub(super) flats: Vec<FlatBlock>,
 }
 
 /// Chord of the part's triangles, voxels: well below what any figure of the report resolves.
@@ -96,7 +100,7 @@ pub(super) fn part(
             part.solid.messages.join("; ")
         ),
     );
-    *bodies = Bodies::default();
+    bodies.forget();
     let joined = join(surface, bodies, options, monitor)?;
     let part = united(
         surface,
@@ -175,6 +179,7 @@ pub(super) fn united(
             ),
         );
     }
+    let (solid, flats) = trimmed(solid, bodies, voxel, options, monitor)?;
     let block = SolidBlock {
         valid: solid.valid,
         bodies: solid.bodies,
@@ -205,8 +210,46 @@ pub(super) fn united(
         non_design_max,
         block: Some(block),
         non_design,
+        flats,
         solid,
     })
+}
+
+/// Cuts the part plane at the flat faces that can be, and tells of each.
+#[cfg(feature = "occt")]
+fn trimmed(
+    solid: CadSolid,
+    bodies: &Bodies,
+    voxel: f64,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<(CadSolid, Vec<FlatBlock>), StageError> {
+    let flats = &bodies.flats.faces;
+    let (free, height): (Vec<&Flat>, f64) = (
+        flats.iter().filter(|f| f.reason.is_none()).collect(),
+        options.flats.height * voxel,
+    );
+    let (solid, reasons) = if free.is_empty() {
+        (solid, Vec::new())
+    } else {
+        cad::trim(solid, &free, height, &bodies.solids, &options.cad, monitor)?
+    };
+    let mut reasons = reasons.into_iter();
+    let blocks = flats.iter().map(|flat| {
+        let reason = match &flat.reason {
+            None => reasons.next().flatten(),
+            known => known.clone(),
+        };
+        FlatBlock {
+            place: (flat.middle - flat.normal * flat.height(&flat.middle)).into(),
+            normal: flat.normal.into(),
+            area: flat.area,
+            plane: reason.is_none(),
+            reason,
+        }
+    });
+    let blocks = blocks.collect();
+    Ok((solid, blocks))
 }
 
 #[cfg(feature = "occt")]
@@ -282,6 +325,7 @@ pub(super) fn united(
         non_design_max: None,
         block: None,
         non_design: Vec::new(),
+        flats: Vec::new(),
     })
 }
 

@@ -65,6 +65,9 @@ pub struct Report {
     /// Surfaces and bosses that were recognised in the proposal.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub candidates: Vec<CandidateBlock>,
+    /// Flat faces that were to become exactly plane.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub flats: Vec<FlatBlock>,
     /// Faces of the design space.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub design_space: Vec<DesignFaceBlock>,
@@ -456,6 +459,22 @@ pub struct CandidateBlock {
     /// It is united with the part.
     pub used: bool,
     /// Why it is no boss, or not used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+/// A flat face of the proposal with a sharp border.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct FlatBlock {
+    /// Middle, mm.
+    pub place: [f64; 3],
+    /// Unit normal, out of the material.
+    pub normal: [f64; 3],
+    /// Area in the proposal, mm2.
+    pub area: f64,
+    /// The part is exactly plane there.
+    pub plane: bool,
+    /// Why not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }

@@ -22,9 +22,9 @@ use serde_json::Value;
 
 pub use blocks::{
     BodyBlock, BoreBlock, CandidateBlock, CornerDeviation, DesignFaceBlock, DistanceBlock,
-    FileEntry, InputBlock, InputFile, NonDesignBlock, OptimizeBlock, RadiusRange, RefusedFile,
-    RemeshBlock, RepairEntry, Report, SkeletonBlock, SolidBlock, StageEntry, TopologyBlock,
-    TopologyChangeEntry, VolumeBlock,
+    FileEntry, FlatBlock, InputBlock, InputFile, NonDesignBlock, OptimizeBlock, RadiusRange,
+    RefusedFile, RemeshBlock, RepairEntry, Report, SkeletonBlock, SolidBlock, StageEntry,
+    TopologyBlock, TopologyChangeEntry, VolumeBlock,
 };
 pub use casting::{
     FeedBlock, FeederBlock, FindingBlock, HotSpotBlock, InfeasibleBlock, MouldBlock, SolidifyBlock,
