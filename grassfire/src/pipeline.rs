@@ -21,6 +21,7 @@ mod optimize;
 mod recognise;
 mod record;
 mod run;
+mod score;
 mod shape;
 mod short_edges;
 mod tetrahedra;

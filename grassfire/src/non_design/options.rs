@@ -105,7 +105,7 @@ impl Default for FlatOptions {
             crease_angle: None,
             min_sharp: 0.6,
             min_area: 100.0,
-            raise: 0.5,
+            raise: 0.8,
             height: 4.0,
         }
     }

@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 use super::ReconstructOptions;
 use super::error::{PipelineError, StageError};
 use super::record::Record;
+use super::score::{Best, MANY, Score, next_size};
 use crate::fit::{FitOptions, Fitted, fit, volume};
 use crate::medial::MedialAxis;
 use crate::monitor::Monitor;
 use crate::radii;
 use crate::remesh::{Remeshed, WrapOptions, wrap};
-use crate::report::Limits;
 use crate::skeleton::{self, QuadSkeleton, Skeleton, quad_skeleton};
 use crate::spline::{
     self, Brep, ControlMesh, CurvatureJump, G1Report, SplineError, Tessellation, build_brep,
@@ -29,12 +29,16 @@ pub struct RetryOptions {
     /// not cut itself and follows the proposal within `report.limits`. After a body that cuts itself sizes above 1 come
     /// first. A skeleton drawn elsewhere is tried once.
     pub quad_sizes: Vec<f64>,
+    /// A body is close enough when it is within this distance of the proposal (rms, 95 % within twice that), voxels; else finer
+    /// quads are tried, and the closest body is kept.
+    pub close: f64,
 }
 
 impl Default for RetryOptions {
     fn default() -> Self {
         Self {
-            quad_sizes: vec![1.0, 0.8, 1.3, 0.6],
+            quad_sizes: vec![1.0, 0.8, 1.3, 0.65],
+            close: 0.22,
         }
     }
 }
@@ -145,19 +149,27 @@ impl Workshop<'_> {
             source: StageError::NoQuadSize,
         });
         let (mut left, mut attempt) = (sizes.to_vec(), 0);
+        let close = self.options.retry.close;
         loop {
-            let sound = best
-                .as_ref()
-                .map(|(score, _)| score.sound() && !score.torn());
-            let Some(size) = next_size(&mut left, sound.ok(), self.base.united.is_some()) else {
+            let best_so_far = match &best {
+                Err(_) => Best::None,
+                Ok((score, _)) if score.good() => Best::Rough,
+                Ok((score, _)) if score.sound() && !score.torn() => Best::Far,
+                Ok(_) => Best::Unsound,
+            };
+            let Some(size) = next_size(&mut left, best_so_far, self.base.united.is_some()) else {
                 break;
             };
             attempt += 1;
             let name = format!("try {attempt} (quad size x {size})");
             match self.one(size) {
-                Ok((score, shape)) if score.good() => return Ok((score, shape)),
+                Ok((score, shape)) if score.good() && score.rough <= close => {
+                    return Ok((score, shape));
+                }
                 Ok((score, shape)) => {
-                    self.monitor.warn("fit", format!("{name}: {score}"));
+                    if !score.good() {
+                        self.monitor.warn("fit", format!("{name}: {score}"));
+                    }
                     let hopeless =
                         score.hopeless() || self.base.united.is_some() && score.crossings > MANY;
                     let least = best.as_ref().ok();
@@ -271,102 +283,6 @@ impl Workshop<'_> {
     }
 }
 
-/// Takes the next size out of those left; after a body that cuts itself coarser quads come first: they cost less time,
-/// and give fewer faces.
-fn next_size(left: &mut Vec<f64>, sound: Option<bool>, design_part: bool) -> Option<f64> {
-    left.retain(|&size| worth_trying(size, sound, design_part));
-    let coarser = left.iter().position(|&size| size > 1.0);
-    let first = coarser.filter(|_| sound == Some(false)).unwrap_or(0);
-    (first < left.len()).then(|| left.remove(first))
-}
-
-/// Whether a body with quads of `size` may be better than the best so far, which is `sound` or is none.
-///
-/// Coarser quads may get rid of crossings, but never of distance; much finer ones neither, since the fit splits quads that
-/// are too coarse. Of a design part that cuts itself in two tries the whole proposal is the better next try.
-fn worth_trying(size: f64, sound: Option<bool>, design_part: bool) -> bool {
-    match sound {
-        Some(true) => (FINE..=1.0).contains(&size),
-        Some(false) => size >= FINE && !(design_part && size > 1.0),
-        None => true,
-    }
-}
-
-/// A design part that cuts itself at more places than this gets no other try: the whole proposal is the better one.
-const MANY: usize = 3;
-
-/// Quads below this multiple of the usual size are much finer.
-const FINE: f64 = 0.75;
-
-/// How good a fitted body is.
-struct Score {
-    /// Places where it cuts itself.
-    crossings: usize,
-    /// Patches whose normal flips over.
-    folds: usize,
-    /// Distance and volume over their limits, the largest ratio; above 1 a limit is exceeded.
-    excess: f64,
-    /// Largest distance, voxels.
-    farthest: f64,
-}
-
-/// The fit measures on its own samples; the final figures may be a little worse.
-const MARGIN: f64 = 0.95;
-/// Bodies that are farther off somewhere have a slit that the proposal has not, or lack a member, voxels.
-const TORN: f64 = 3.0;
-/// Bodies that miss a limit by more than this factor and cut themselves are given up.
-const HOPELESS: f64 = 3.0;
-/// Sound bodies that miss a limit by up to this factor are kept: they can be edited, wrapped ones cannot.
-const USABLE: f64 = 1.5;
-
-impl Score {
-    fn of(fitted: &Fitted, voxel: f64, limits: &Limits) -> Self {
-        let both = [&fitted.body_to_iso, &fitted.iso_to_body];
-        let rms = both.iter().map(|d| d.rms).fold(0.0, f64::max) / (voxel * limits.distance_rms);
-        let p95 = both.iter().map(|d| d.p95).fold(0.0, f64::max) / (voxel * limits.distance_p95);
-        let volume = (fitted.volume / fitted.iso_volume - 1.0).abs() / limits.volume;
-        Self {
-            crossings: fitted.self_intersections.len(),
-            folds: flipped(fitted),
-            excess: rms.max(p95).max(volume) / MARGIN,
-            farthest: both.iter().map(|d| d.max).fold(0.0, f64::max) / voxel,
-        }
-    }
-
-    /// Close on the whole, if at all, but not at some place.
-    fn torn(&self) -> bool {
-        self.farthest > TORN
-    }
-
-    fn sound(&self) -> bool {
-        self.crossings + self.folds == 0
-    }
-
-    fn good(&self) -> bool {
-        self.sound() && self.excess <= 1.0 && !self.torn()
-    }
-
-    /// Sound, and not so far off that a body without a skeleton would serve better.
-    fn usable(&self) -> bool {
-        self.sound() && self.excess <= USABLE
-    }
-
-    /// So far off that other quad sizes do not help: the part is not made of sheets and members.
-    fn hopeless(&self) -> bool {
-        self.crossings > 0 && self.excess > HOPELESS
-    }
-
-    /// Orders tries: soundness first, then closeness, everywhere and on the whole.
-    fn worse(&self) -> (usize, usize, f64) {
-        let far = if self.torn() {
-            self.farthest / TORN
-        } else {
-            0.0
-        };
-        (self.crossings, self.folds, self.excess.max(far))
-    }
-}
-
 impl Shape {
     /// The body neither cuts itself nor folds over.
     pub(super) fn sound(&self) -> bool {
@@ -377,25 +293,6 @@ impl Shape {
 /// Patches of a fitted body whose normal flips over somewhere.
 pub(super) fn flipped(fitted: &Fitted) -> usize {
     fitted.folds.iter().filter(|fold| fold.value < 0.0).count()
-}
-
-impl std::fmt::Display for Score {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.crossings {
-            0 if self.folds > 0 => write!(f, "{} faces of the body fold over", self.folds),
-            0 if self.torn() => write!(
-                f,
-                "the body is {:.1} voxels from the proposal at one place",
-                self.farthest
-            ),
-            0 => write!(
-                f,
-                "the body misses the proposal by {:.2} times the limits for distance and volume",
-                self.excess
-            ),
-            places => write!(f, "the body cuts itself at {places} places"),
-        }
-    }
 }
 
 /// Takes a skeleton drawn elsewhere; radii that it does not have come from the medial axis.
@@ -430,42 +327,4 @@ pub(super) fn surface(
         brep,
         tessellation,
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_body_with_a_slit_of_four_voxels_was_taken_as_good() {
-        let score = |farthest: f64| Score {
-            crossings: 0,
-            folds: 0,
-            excess: 0.5,
-            farthest,
-        };
-        let (torn, close) = (score(4.0), score(1.0));
-        assert!(close.good() && !torn.good() && torn.sound());
-        assert!(close.worse() < torn.worse());
-    }
-
-    #[test]
-    fn a_body_that_cut_itself_was_tried_with_finer_quads_before_coarser_ones() {
-        let mut left = vec![1.0, 0.8, 1.3, 0.6];
-        assert_eq!(next_size(&mut left, None, false), Some(1.0));
-        assert_eq!(next_size(&mut left, Some(false), false), Some(1.3));
-        assert_eq!(next_size(&mut left, Some(true), false), Some(0.8));
-        assert_eq!(next_size(&mut left, Some(true), false), None);
-        assert_eq!(next_size(&mut vec![0.8, 1.3], Some(true), false), Some(0.8));
-        assert_eq!(next_size(&mut vec![0.8, 1.3], Some(false), true), Some(0.8));
-    }
-
-    #[test]
-    fn slightly_finer_quads_are_for_distance_and_coarser_ones_for_crossings() {
-        assert!(worth_trying(1.0, None, false) && worth_trying(0.6, None, true));
-        assert!(worth_trying(0.8, Some(true), true) && !worth_trying(1.3, Some(true), false));
-        assert!(!worth_trying(0.6, Some(true), true));
-        assert!(worth_trying(1.3, Some(false), false) && !worth_trying(0.6, Some(false), false));
-        assert!(worth_trying(0.8, Some(false), true) && !worth_trying(1.3, Some(false), true));
-    }
 }
