@@ -36,7 +36,7 @@ pub use casting::{SolidJob, mould_solid, solidify_solid};
 pub use error::{PipelineError, StageError};
 pub use exchange::{FileOptions, Format};
 pub use optimize::{OptimizeJob, check_case, optimize};
-pub use run::{RunJob, Stage, run};
+pub use run::{RunJob, Stage, run, share_optimization};
 pub use shape::RetryOptions;
 pub use verify::{VerifyJob, verify_solid};
 
