@@ -236,7 +236,12 @@ pub fn verify(
         }
         Ok(any)
     };
-    let compared = match equal_volume::moved(mesh, volume, fine.h, &kept, monitor)? {
+    // Distances are known some voxels far: those of the coarser grid reach twice as far.
+    let moved = match equal_volume::moved(mesh, volume, fine.h, &kept, monitor)? {
+        None => equal_volume::moved(mesh, volume, coarse.h, &kept, monitor)?,
+        moved => moved,
+    };
+    let compared = match moved {
         Some(moved) => {
             let before = solve(&moved.before, &coarse, 0.85)?;
             let layout = Layout {
