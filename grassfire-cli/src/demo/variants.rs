@@ -15,7 +15,7 @@ use grassfire::report::Report;
 use serde::Serialize;
 
 use crate::args::RunArgs;
-use crate::failure::Failure;
+use crate::failure::{Failure, chain};
 use crate::{case, run};
 
 const FREE: &str = include_str!("../../../examples/wishbone-free/case.toml");
@@ -74,6 +74,10 @@ const DRAWN_IN_OPTIMIZATION: &str = "II";
 /// The variant that the paper says is better than it.
 const EDITED: &str = "III";
 
+/// Exit codes: the user cancelled; a stage failed.
+const CANCELLED: u8 = 130;
+const FAILED: u8 = 3;
+
 /// Figures of one variant; none where it has no such figure.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 struct Column {
@@ -110,6 +114,8 @@ struct Column {
     checks_met: Option<f64>,
     checks: Option<f64>,
     seconds: Option<f64>,
+    /// Why figures are missing: what failed, and how.
+    errors: Vec<String>,
 }
 
 /// A line of the table: text, decimals, figure.
@@ -139,7 +145,8 @@ const LINES: [Line; 19] = [
 
 /// Runs all variants into folders of their names and shows their table, which table.md holds too.
 ///
-/// Ends with exit code 1 when a check of any variant is not met.
+/// A variant that cannot be made does not end the others: its column is empty, and the table says why. Ends with exit code 3
+/// then, and with 1 when a check of any variant is not met.
 pub fn command(output: &Path, args: &RunArgs) -> Result<u8, Failure> {
     let jobs = jobs(output, args)?;
     let threads = jobs.first().map_or(0, |job| job.case.threads);
@@ -154,8 +161,14 @@ pub fn command(output: &Path, args: &RunArgs) -> Result<u8, Failure> {
     } else if !args.quiet {
         run::print(&table);
     }
-    let missed = columns.iter().any(|c| c.checks_met < c.checks);
-    Ok(u8::from(missed))
+    Ok(exit_code(&columns))
+}
+
+fn exit_code(columns: &[Column]) -> u8 {
+    if columns.iter().any(|c| !c.errors.is_empty()) {
+        return FAILED;
+    }
+    u8::from(columns.iter().any(|c| c.checks_met < c.checks))
 }
 
 /// The project files, unpacked, with the edits of each variant.
@@ -197,26 +210,72 @@ fn columns(
 ) -> Result<Vec<Column>, PipelineError> {
     let mut columns: Vec<Column> = Vec::new();
     for (job, variant) in jobs.iter().zip(&VARIANTS) {
-        if let Some(other) = variant.optimized_as {
-            pipeline::share_optimization(&output.join(other), &job.output)?;
-        }
-        let report = pipeline::run(job, monitor)?.report;
-        monitor.clear_warnings();
-        let frozen = frozen(job, monitor)?;
-        monitor.clear_warnings();
-        columns.push(column(variant.name, &report, &frozen));
+        columns.push(made(job, variant, output, monitor)?);
     }
     let of = |name: &str| VARIANTS.iter().position(|v| v.name == name);
-    let Some(drawn) = of(DRAWN_IN_OPTIMIZATION).and_then(|n| jobs.get(n)) else {
+    let Some(drawn) = of(DRAWN_IN_OPTIMIZATION).filter(|&n| columns[n].volume.is_some()) else {
         return Ok(columns);
     };
     for (column, variant) in columns.iter_mut().zip(&VARIANTS) {
-        if variant.growth.is_some() {
-            column.cv_drawn = at_volume(drawn, column.volume, output, monitor)?;
+        if variant.growth.is_some() && column.volume.is_some() {
+            let found = at_volume(&jobs[drawn], column.volume, output, monitor);
+            let what = format!("{DRAWN_IN_OPTIMIZATION} at the volume of {}", variant.name);
+            column.cv_drawn = tried(found, &what, &mut column.errors)?.flatten();
             monitor.clear_warnings();
         }
     }
     Ok(columns)
+}
+
+/// One variant, made and frozen as far as that goes.
+fn made(
+    job: &RunJob,
+    variant: &Variant,
+    output: &Path,
+    monitor: &Monitor,
+) -> Result<Column, PipelineError> {
+    let run = || {
+        if let Some(other) = variant.optimized_as {
+            pipeline::share_optimization(&output.join(other), &job.output)?;
+        }
+        Ok(pipeline::run(job, monitor)?.report)
+    };
+    let mut errors = Vec::new();
+    let report = tried(run(), variant.name, &mut errors)?;
+    monitor.clear_warnings();
+    let frozen = match &report {
+        Some(_) => tried(
+            frozen(job, monitor),
+            &format!("{} freezing", variant.name),
+            &mut errors,
+        )?,
+        None => None,
+    };
+    monitor.clear_warnings();
+    Ok(Column {
+        errors,
+        ..column(
+            variant.name,
+            &report.unwrap_or_default(),
+            &frozen.unwrap_or_default(),
+        )
+    })
+}
+
+/// What was made, or a line in `errors` that says why not. Only cancelling ends everything.
+fn tried<T>(
+    result: Result<T, PipelineError>,
+    what: &str,
+    errors: &mut Vec<String>,
+) -> Result<Option<T>, PipelineError> {
+    match result {
+        Err(error) if error.exit_code() == CANCELLED => Err(error),
+        Err(error) => {
+            errors.push(format!("{what} was not made: {}", chain(&error)));
+            Ok(None)
+        }
+        Ok(made) => Ok(Some(made)),
+    }
 }
 
 fn part(job: &RunJob) -> PathBuf {
@@ -277,7 +336,6 @@ fn column(name: &str, report: &Report, frozen: &Report) -> Column {
         u_max: proof.map(|p| p.u_max),
         energy: proof.map(|p| p.strain_energy / 1e3),
         cv: proof.map(|p| p.cv / 1e6),
-        cv_drawn: None,
         stress: proof.and_then(|p| p.stress_max),
         undercut: report.mould.as_ref().map(|m| m.undercut_volume),
         hot_spots: solidify.map(|s| s.hot_spots.iter().filter(|h| !h.fed).count() as f64),
@@ -287,9 +345,10 @@ fn column(name: &str, report: &Report, frozen: &Report) -> Column {
         falling: feed.map(|f| 100.0 * f.falling.falling),
         distance: distance.map(|d| d.rms / d.voxel),
         faces: report.solid.as_ref().map(|s| s.faces as f64),
-        checks_met: Some(report.checks.iter().filter(|c| c.met).count() as f64),
-        checks: Some(report.checks.len() as f64),
-        seconds: Some(stages.map(|s| s.seconds).sum()),
+        checks_met: proof.map(|_| report.checks.iter().filter(|c| c.met).count() as f64),
+        checks: proof.map(|_| report.checks.len() as f64),
+        seconds: proof.map(|_| stages.map(|s| s.seconds).sum()),
+        ..Column::default()
     }
 }
 
@@ -331,7 +390,11 @@ fn table(ours: &[Column]) -> String {
         let cells = columns.iter().map(cell).collect::<String>();
         let _ = writeln!(text, "| {name:28} |{cells}");
     }
-    text + &claim(ours)
+    text += &claim(ours);
+    for error in ours.iter().flat_map(|c| &c.errors) {
+        let _ = writeln!(text, "\n{error}");
+    }
+    text
 }
 
 /// The paper says that c V of III is smaller than that of II: as they are, and at the volume of III.
@@ -353,6 +416,9 @@ fn claim(ours: &[Column]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use grassfire::monitor::Cancelled;
+    use grassfire::pipeline::StageError;
+
     use super::*;
 
     #[test]
@@ -374,6 +440,32 @@ mod tests {
         assert!(text.contains("paper 0.80, here 0.75;"), "{text}");
         assert!(text.trim_end().ends_with("1.50"), "{text}");
         assert!(claim(&ours[..1]).is_empty());
+    }
+
+    #[test]
+    fn a_variant_that_fails_does_not_lose_the_table() {
+        let failed = |stage, source| -> Result<Report, _> { Err(PipelineError { stage, source }) };
+        let mut errors = Vec::new();
+        let source = || StageError::NoQuadSize;
+        let none = tried(failed("fit", source()), "III", &mut errors);
+        assert!(matches!(none, Ok(None)));
+        let mut ours = [
+            Column {
+                name: "II".to_owned(),
+                cv: Some(2000.0),
+                ..Column::default()
+            },
+            column("III", &Report::default(), &Report::default()),
+        ];
+        assert_eq!(exit_code(&ours), 0);
+        ours[1].errors = errors;
+        assert_eq!(exit_code(&ours), FAILED);
+        let text = table(&ours);
+        assert!(text.contains("here unknown"), "{text}");
+        let why = format!("III was not made: fit: {}", source());
+        assert!(text.trim_end().ends_with(&why), "{text}");
+        let cancelled = failed("fit", StageError::Cancelled(Cancelled));
+        assert!(tried(cancelled, "III", &mut Vec::new()).is_err());
     }
 
     #[test]
