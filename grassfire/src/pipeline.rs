@@ -45,7 +45,7 @@ use crate::case::Body;
 use crate::casting::feed::FeedOptions;
 use crate::casting::mould::MouldOptions;
 use crate::casting::solidify::SolidifyOptions;
-use crate::edit::RadiusEdit;
+use crate::edit::Edit;
 use crate::fit::FitOptions;
 use crate::io::ReadOptions;
 use crate::medial::{self, MedialOptions, PoleOptions};
@@ -90,8 +90,8 @@ pub struct ReconstructOptions {
     pub thicken: ThickenOptions,
     /// Fit to the proposal.
     pub fit: FitOptions,
-    /// Edits of the radii of the proposal's skeleton, in their order.
-    pub edits: Vec<RadiusEdit>,
+    /// Edits of the proposal's skeleton, in their order.
+    pub edits: Vec<Edit>,
     /// Sections that grow towards the feeders.
     pub feed: FeedOptions,
     /// What to do when a body cuts itself.

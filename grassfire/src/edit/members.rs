@@ -1,0 +1,150 @@
+//! Members of a skeleton, found by a place: sheets and beams.
+
+use crate::Vec3;
+use crate::mesh::bvh::nearest_on_triangle;
+use crate::skeleton::{EdgeTable, Skeleton, UnionFind};
+
+/// A place is in a member when it is no farther from its middle than this many radii: walls of two runs differ a little.
+const REACH: f64 = 1.25;
+
+/// A sheet or beam, and how it lies to the place that names it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Member {
+    /// Numbers of its quads, ascending.
+    pub(super) quads: Vec<usize>,
+    /// Numbers of its beam edges, ascending.
+    pub(super) beams: Vec<usize>,
+    /// Its point that is nearest to the place, mm.
+    pub(super) nearest: Vec3,
+    /// How far that is, mm.
+    pub(super) distance: f64,
+    /// How far it may be for the place to be in the member, mm.
+    pub(super) reach: f64,
+}
+
+/// The sheet (quads joined over edges with two quads) nearest to a place, none without quads.
+pub(super) fn sheet_at(skeleton: &Skeleton, place: &Vec3) -> Option<Member> {
+    let cells = skeleton.quads.iter().map(|q| &q[..]);
+    let (first, nearest, reach) = nearest(skeleton, cells, place)?;
+    let labels = sheets(skeleton);
+    Some(Member {
+        quads: alike(&labels, first),
+        beams: Vec::new(),
+        nearest,
+        distance: (nearest - place).norm(),
+        reach,
+    })
+}
+
+/// The beam (edges joined at points where two of them and nothing else meet) nearest to a place, none without beams.
+pub(super) fn beam_at(skeleton: &Skeleton, place: &Vec3) -> Option<Member> {
+    let cells = skeleton.beams.iter().map(|b| &b[..]);
+    let (first, nearest, reach) = nearest(skeleton, cells, place)?;
+    let labels = beams(skeleton);
+    Some(Member {
+        quads: Vec::new(),
+        beams: alike(&labels, first),
+        nearest,
+        distance: (nearest - place).norm(),
+        reach,
+    })
+}
+
+/// The sheet of every quad: the number of its first quad.
+pub(super) fn sheets(skeleton: &Skeleton) -> Vec<u32> {
+    let table = EdgeTable::of_quads(&skeleton.quads);
+    let mut sets = UnionFind::new(skeleton.quads.len());
+    for (_, faces) in table.iter() {
+        if let [a, b] = faces {
+            sets.join(*a, *b);
+        }
+    }
+    (0..skeleton.quads.len() as u32)
+        .map(|q| sets.find(q))
+        .collect()
+}
+
+/// The beam of every beam edge: the number of its first edge.
+pub(super) fn beams(skeleton: &Skeleton) -> Vec<u32> {
+    let mut at: Vec<Vec<u32>> = vec![Vec::new(); skeleton.points.len()];
+    for (n, b) in skeleton.beams.iter().enumerate() {
+        b.iter().for_each(|&v| at[v as usize].push(n as u32));
+    }
+    // A point with quads is a junction.
+    skeleton
+        .quads
+        .iter()
+        .flatten()
+        .for_each(|&v| at[v as usize].clear());
+    let mut sets = UnionFind::new(skeleton.beams.len());
+    for meeting in &at {
+        if let [a, b] = meeting[..] {
+            sets.join(a, b);
+        }
+    }
+    (0..skeleton.beams.len() as u32)
+        .map(|b| sets.find(b))
+        .collect()
+}
+
+/// How many different labels there are, where every set is labelled by its first member.
+pub(super) fn count(labels: &[u32]) -> usize {
+    (0..labels.len())
+        .filter(|&n| labels[n] as usize == n)
+        .count()
+}
+
+fn alike(labels: &[u32], one: usize) -> Vec<usize> {
+    (0..labels.len())
+        .filter(|&n| labels[n] == labels[one])
+        .collect()
+}
+
+/// The cell nearest to a place, its nearest point, and how far a place may be from it.
+fn nearest<'a>(
+    skeleton: &Skeleton,
+    cells: impl Iterator<Item = &'a [u32]>,
+    place: &Vec3,
+) -> Option<(usize, Vec3, f64)> {
+    let on = |corners: &[u32]| {
+        let p = |k: usize| skeleton.points[corners[k.min(corners.len() - 1)] as usize];
+        let halves = [[p(0), p(1), p(2)], [p(0), p(2), p(3)]];
+        let [a, b] = halves.map(|half| nearest_on_triangle(place, &half));
+        if (a - place).norm() <= (b - place).norm() {
+            a
+        } else {
+            b
+        }
+    };
+    let found = cells.enumerate().map(|(n, corners)| {
+        let point = on(corners);
+        let radii = corners.iter().map(|&v| skeleton.radii[v as usize]);
+        (n, point, REACH * radii.fold(0.0, f64::max))
+    });
+    found.min_by(|a, b| (a.1 - place).norm().total_cmp(&(b.1 - place).norm()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixtures::{frame, tee};
+    use super::*;
+
+    #[test]
+    fn beams_end_at_junctions_and_sheets_at_seams() {
+        let skeleton = frame();
+        assert_eq!(count(&beams(&skeleton)), 12);
+        // Above the middle of one beam: all its edges.
+        let member = beam_at(&skeleton, &Vec3::new(10.0, 10.0, 1.0)).expect("there are beams");
+        assert_eq!(member.beams.len(), 3);
+        assert!((member.distance - 1.0).abs() < 1e-12 && member.distance <= member.reach);
+        let tee = tee();
+        assert_eq!(count(&sheets(&tee)), 3);
+        let web = sheet_at(&tee, &Vec3::new(20.5, 12.0, 9.0)).expect("there are sheets");
+        let of_web = |q: &usize| {
+            tee.quads[*q]
+                .iter()
+                .any(|&v| tee.points[v as usize].z > 1.0)
+        };
+        assert!(!web.quads.is_empty() && web.quads.iter().all(of_web));
+    }
+}
