@@ -94,6 +94,26 @@ fn edits_move_and_delete_members() {
     }
 }
 
+/// A second plate above the first, and walls from outer rim to outer rim: a box with a hole in its lid and in its bottom.
+#[test]
+fn edits_copy_and_bridge_members() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let edits =
+        r#"edits=[{"duplicate":[0,0,14]},{"bridge":{"from":[17.5,0,16.5],"to":[17.5,0,2.5]}}]"#;
+    let run = run_plate(folder.path(), &["--recognise", "off", "--set", edits]);
+    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+    let report = run.report();
+    let pieces = |n: usize| report["edits"]["edits"][n]["after"]["topology"]["b0"].clone();
+    assert_eq!([pieces(0), pieces(1)], [2, 1]);
+    let topology = &report["topology"]["solid"];
+    assert_eq!((&topology["b0"], &topology["b1"]), (&1.into(), &2.into()));
+    assert_eq!(
+        report["body"]["self_intersections"], 0,
+        "{}",
+        report["body"]
+    );
+}
+
 #[test]
 fn skeleton_comes_back_as_ply_and_as_obj() {
     let folder = tempfile::tempdir().expect("a folder");

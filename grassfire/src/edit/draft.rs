@@ -22,6 +22,8 @@ pub struct EditedSkeleton {
     pub(super) fresh_beams: Vec<bool>,
     /// The material of the proposal that is taken away.
     pub(super) gone: Vec<Hull>,
+    /// Material that no quad or beam stands for.
+    pub(super) filling: Vec<Hull>,
 }
 
 impl EditedSkeleton {
@@ -35,6 +37,7 @@ impl EditedSkeleton {
             fresh_quads: vec![false; skeleton.quads.len()],
             fresh_beams: vec![false; skeleton.beams.len()],
             gone: Vec::new(),
+            filling: Vec::new(),
         }
     }
 
@@ -119,6 +122,29 @@ impl EditedSkeleton {
         self.base.push(radius);
         self.kept.push(false);
         self.skeleton.points.len() as u32 - 1
+    }
+
+    /// Means over some points: place, radius, and radius in the proposal.
+    pub(super) fn mean(&self, of: &[u32]) -> (Vec3, f64, f64) {
+        let count = of.len() as f64;
+        let sum = |values: &[f64]| of.iter().map(|&v| values[v as usize]).sum::<f64>();
+        let places = of.iter().map(|&v| self.skeleton.points[v as usize]);
+        let place = places.sum::<Vec3>() / count;
+        (
+            place,
+            sum(&self.skeleton.radii) / count,
+            sum(&self.base) / count,
+        )
+    }
+
+    /// A new point in the middle of some; gives its number.
+    pub(super) fn add_mean(&mut self, of: &[u32]) -> u32 {
+        let (place, radius, base) = self.mean(of);
+        let kept = of.iter().all(|&v| self.kept[v as usize]);
+        let number = self.add_point(place, radius);
+        self.base[number as usize] = base;
+        self.kept[number as usize] = kept;
+        number
     }
 
     /// A new quad.

@@ -69,12 +69,32 @@ pub enum Refusal {
         distance: f64,
         size: f64,
     },
+    #[error(
+        "joins no points: the nearest two, at {}, are {distance:.2} mm apart",
+        at(place)
+    )]
+    Apart { distance: f64, place: Vec3 },
+    #[error("folds a quad at {}: it would lose a corner", at(place))]
+    Folds { place: Vec3 },
+    #[error("holds something at {} that hangs on nothing already", at(place))]
+    Loose { place: Vec3 },
+    #[error("joins what meets already at {}", at(place))]
+    Meets { place: Vec3 },
+    #[error("joins a rim of {from} edges and one of {to} at {}", at(place))]
+    Uneven { from: usize, to: usize, place: Vec3 },
+    #[error(
+        "fills nothing: the sheets, {distance:.1} mm apart at {}, do not face each other",
+        at(place)
+    )]
+    Beside { distance: f64, place: Vec3 },
+    #[error("has within, but {key} names its places itself")]
+    Within { key: &'static str },
     #[error("leaves a skeleton that is none: {0}")]
     Invalid(#[from] SkeletonError),
 }
 
 /// The kinds of edits, as messages list them.
-const KINDS: &str = "set, scale, add, move, rotate, stretch, snap, delete and duplicate";
+const KINDS: &str = "set, scale, add, move, rotate, stretch, snap, delete, duplicate, subdivide, weld, merge, split, bridge, strut and fill";
 
 fn at(p: &Vec3) -> String {
     format!("({:.1}, {:.1}, {:.1}) mm", p.x, p.y, p.z)
@@ -97,6 +117,13 @@ impl EditListError {
                 "choose less points, another plane or another factor, or delete the place instead"
             }
             Refusal::Far { .. } => "lengths are mm",
+            Refusal::Apart { .. } => "a larger tolerance joins more",
+            Refusal::Folds { .. } => "a smaller tolerance joins less; whole quads can be deleted",
+            Refusal::Loose { .. } => "take it out of the list",
+            Refusal::Meets { .. } => "name places on two different members",
+            Refusal::Uneven { .. } => "subdivide a quad at the one with less edges first",
+            Refusal::Beside { .. } => "name two sheets with a room between them, or move one",
+            Refusal::Within { .. } => "leave within out",
             Refusal::Invalid(_) => return None,
         };
         Some(text.to_owned())

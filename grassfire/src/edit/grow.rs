@@ -93,7 +93,7 @@ pub fn cells_of(skeleton: &Skeleton) -> TriMesh {
 }
 
 /// Value at `p` in a triangle, or on the segment that it is when its last two corners are one point.
-fn interpolate(mesh: &TriMesh, corners: [u32; 3], p: &Vec3, values: &[f64]) -> f64 {
+pub(super) fn interpolate(mesh: &TriMesh, corners: [u32; 3], p: &Vec3, values: &[f64]) -> f64 {
     let [a, b, c] = corners.map(|v| mesh.points[v as usize]);
     let [va, vb, vc] = corners.map(|v| values[v as usize]);
     let (u, v, w) = (b - a, c - a, p - a);

@@ -3,15 +3,19 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::bridge::Between;
 use super::draft::EditedSkeleton;
 use super::error::{EditListError, Refusal};
 use super::places::{Plane, Rotation, Stretch};
-use super::region::{Region, select};
-use super::{copy, delete, members, places};
+use super::region::{Region, Selection, select};
+use super::{bridge, copy, delete, fill, members, places, split, subdivide, weld};
 use crate::Vec3;
 use crate::radii;
 use crate::skeleton::{self, Skeleton};
 use crate::topology::Betti;
+
+/// Each makes four quads of one.
+const MOST_HALVINGS: usize = 4;
 
 /// One edit of the proposal's skeleton: where, and one kind of change. It names a place, not points: so it can be replayed on
 /// another proposal. Radii stay with their points when these move.
@@ -40,6 +44,20 @@ pub struct Edit {
     pub delete: bool,
     /// Copies quads and beams, this much away, mm.
     pub duplicate: Option<[f64; 3]>,
+    /// Halves quads and beam edges, and the strips they are in, so many times.
+    pub subdivide: usize,
+    /// Joins points that are no farther apart than this, mm.
+    pub weld: Option<f64>,
+    /// Joins all points to one in their middle.
+    pub merge: bool,
+    /// Takes quads and beams loose from the others; nothing moves.
+    pub split: bool,
+    /// Spans quads between two rims, each from corner to corner.
+    pub bridge: Option<Between>,
+    /// A beam between two points of the skeleton.
+    pub strut: Option<Between>,
+    /// Makes the room between two sheets solid, over the points of the first that `within` holds.
+    pub fill: Option<Between>,
     /// `delete` may leave pieces that hang on nothing.
     pub cut: bool,
 }
@@ -51,9 +69,9 @@ pub struct Edited {
     pub kind: &'static str,
     /// Points of the skeleton that it held.
     pub points: usize,
-    /// Mean radius there before and after, mm; after `delete` and `duplicate` that of the points held before.
+    /// Mean radius there before, mm.
     pub mean_before: f64,
-    /// The same after.
+    /// The same after; that before where the edit changes no radii.
     pub mean_after: f64,
     /// Largest change of a radius, mm.
     pub largest_change: f64,
@@ -93,6 +111,13 @@ impl Edit {
             ("snap", self.snap.is_some()),
             ("delete", self.delete),
             ("duplicate", self.duplicate.is_some()),
+            ("subdivide", self.subdivide > 0),
+            ("weld", self.weld.is_some()),
+            ("merge", self.merge),
+            ("split", self.split),
+            ("bridge", self.bridge.is_some()),
+            ("strut", self.strut.is_some()),
+            ("fill", self.fill.is_some()),
         ];
         let given = all.into_iter().filter(|kind| kind.1);
         given.map(|kind| kind.0).collect()
@@ -113,8 +138,20 @@ impl Edit {
         if found > 1 || found == 0 && self.smooth == 0 || self.smooth > 0 && !self.of_radii() {
             return Err(Refusal::Kind { found });
         }
+        if let Some(key) = ["bridge", "strut"].into_iter().find(|k| *k == self.kind())
+            && self.within.is_some()
+        {
+            return Err(Refusal::Within { key });
+        }
         let bad = |key, value, wanted| Err(Refusal::Value { key, value, wanted });
-        for (key, value) in [("set", self.set), ("scale", self.scale)] {
+        if self.subdivide > MOST_HALVINGS {
+            return bad("subdivide", self.subdivide as f64, "at most 4");
+        }
+        for (key, value) in [
+            ("set", self.set),
+            ("scale", self.scale),
+            ("weld", self.weld),
+        ] {
             if let Some(value) = value.filter(|v| !v.is_finite() || *v <= 0.0) {
                 return bad(key, value, "a positive number");
             }
@@ -185,16 +222,46 @@ fn apply(draft: &mut EditedSkeleton, edit: &Edit, least: f64) -> Result<Edited, 
     if edit.of_radii() {
         out.largest_change = change_radii(&mut draft.skeleton, &held, edit, least)?;
         out.mean_after = mean(&draft.skeleton.radii, &held);
-    } else if edit.delete {
-        delete::delete(draft, &selection.with_cells(draft)?, edit.cut)?;
-    } else if let Some(by) = edit.duplicate {
-        copy::duplicate(draft, &selection.with_cells(draft)?, &Vec3::from(by));
-    } else {
+    } else if !change_cells(draft, &selection, edit)? {
         out.moved = places::change(draft, &selection, edit)?;
     }
     skeleton::check(&draft.skeleton)?;
     out.after = counts(&draft.skeleton);
     Ok(out)
+}
+
+/// Edits of quads and beams; false when the edit is none of them.
+fn change_cells(
+    draft: &mut EditedSkeleton,
+    selection: &Selection,
+    edit: &Edit,
+) -> Result<bool, Refusal> {
+    if let Some(by) = edit.duplicate {
+        copy::duplicate(draft, selection.with_cells(draft)?, &Vec3::from(by));
+    } else if let Some(tolerance) = edit.weld {
+        weld::weld(draft, selection, tolerance)?;
+    } else if let Some(between) = edit.bridge {
+        bridge::bridge(draft, &between)?;
+    } else if let Some(between) = edit.strut {
+        bridge::strut(draft, &between)?;
+    } else if let Some(between) = edit.fill {
+        fill::fill(draft, selection, &between)?;
+    } else if edit.delete {
+        delete::delete(draft, selection.with_cells(draft)?, edit.cut)?;
+    } else if edit.merge {
+        weld::merge(draft, selection)?;
+    } else if edit.split {
+        split::split(draft, selection.with_cells(draft)?)?;
+    } else if edit.subdivide > 0 {
+        subdivide::subdivide(draft, selection.with_cells(draft)?);
+        // The finer net has other points there.
+        for _ in 1..edit.subdivide {
+            subdivide::subdivide(draft, &select(edit.within.as_ref(), draft)?);
+        }
+    } else {
+        return Ok(false);
+    }
+    Ok(true)
 }
 
 fn counts(skeleton: &Skeleton) -> Counts {
@@ -241,6 +308,9 @@ fn change_radii(
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
+    use super::super::fixtures::{run, tee};
     use super::*;
 
     fn row() -> Skeleton {
@@ -322,5 +392,54 @@ mod tests {
             "{error}"
         );
         assert!(error.hint().is_some());
+    }
+
+    /// Quads and beams as sorted corners, places and radii in millionths of a millimetre.
+    fn cells(skeleton: &Skeleton) -> Vec<Vec<[i64; 4]>> {
+        let corner = |v: u32| {
+            let (p, r) = (skeleton.points[v as usize], skeleton.radii[v as usize]);
+            [p.x, p.y, p.z, r].map(|x| (1e6 * x).round() as i64)
+        };
+        let quads = skeleton.quads.iter().map(|q| &q[..]);
+        let cells = quads.chain(skeleton.beams.iter().map(|b| &b[..]));
+        let sorted = |cell: &[u32]| {
+            let mut corners: Vec<_> = cell.iter().map(|&v| corner(v)).collect();
+            corners.sort_unstable();
+            corners
+        };
+        let mut out: Vec<_> = cells.map(sorted).collect();
+        out.sort_unstable();
+        out
+    }
+
+    proptest! {
+        #[test]
+        fn a_list_finds_the_same_places_whatever_the_numbers(order in Just((0..28_u32).collect::<Vec<_>>()).prop_shuffle(), turn in 0..18_usize) {
+            let before = tee();
+            let mut other = Skeleton {
+                points: vec![Vec3::zeros(); 28],
+                radii: before.radii.clone(),
+                quads: before.quads.iter().map(|q| q.map(|v| order[v as usize])).collect(),
+                beams: Vec::new(),
+            };
+            (0..28).for_each(|v| other.points[order[v] as usize] = before.points[v]);
+            other.quads.rotate_left(turn);
+            other.quads.iter_mut().for_each(|q| q.rotate_left(turn % 4));
+            // The web turned and halved, a copy of it welded on, its top joined with the base, a corner of the base cut off.
+            let list: Vec<Edit> = serde_json::from_str(r#"[
+                {"within": {"sheet": [20, 15, 9]}, "stretch": {"centre": [20, 0, 0], "factors": [1, 1, 0.8]}},
+                {"within": {"sheet": [20, 15, 9]}, "subdivide": 1},
+                {"within": {"sheet": [20, 14, 9]}, "duplicate": [10, 0, 0]},
+                {"weld": 0.1},
+                {"bridge": {"from": [30, 14, 16], "to": [40, 14, 0]}},
+                {"within": {"box": {"min": [-1, -1, -1], "max": [11, 6, 1]}}, "delete": true},
+                {"within": {"sphere": {"centre": [20, 15, 16], "radius": 9}}, "scale": 1.5, "smooth": 1}
+            ]"#).expect("good edits");
+            let [one, two] = [&before, &other].map(|skeleton| run(skeleton, &list));
+            prop_assert_eq!(cells(&one.skeleton), cells(&two.skeleton));
+            let counts = |edited: &EditedSkeleton| -> Vec<Counts> { edited.done.iter().map(|d| d.after).collect() };
+            prop_assert_eq!(counts(&one), counts(&two));
+            prop_assert_eq!((one.gone.len(), one.done[4].after.quads > one.done[3].after.quads), (two.gone.len(), true));
+        }
     }
 }

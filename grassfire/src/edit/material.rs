@@ -14,7 +14,7 @@ use crate::voxel::VoxelGrid;
 /// 1. Where quads and beams are as they were, the surface moves outward by the growth of their radii ([`grow`]).
 /// 2. The material of quads and beams that were moved or deleted goes. It is what lies deeper in their balls than in those that
 ///    stay; of it the balls of the neighbours that stay are kept, so that these end round, as rims do.
-/// 3. The balls of quads and beams that were moved or made are added: their radii are those of their points.
+/// 3. The balls of quads and beams that were moved or made are added, with the radii of their points, and so are fillings.
 ///
 /// `field` is a signed distance, mm, positive inside, and `surface` its zero surface; where nothing was edited the result is
 /// the field itself. The grid grows as far as new material reaches; two more values a voxel are needed meanwhile. Does not
@@ -27,7 +27,8 @@ pub fn material(
     let (cells, growth) = growing(edited);
     let grown = grow(field, surface, &cells, &growth);
     let radii = &edited.skeleton.radii;
-    let fresh = edited.hulls(true, radii);
+    let mut fresh = edited.hulls(true, radii);
+    fresh.extend(&edited.filling);
     if fresh.is_empty() && edited.gone.is_empty() {
         return grown;
     }

@@ -1,5 +1,6 @@
 //! Members of a skeleton, found by a place: sheets and beams.
 
+use super::error::Refusal;
 use crate::Vec3;
 use crate::mesh::bvh::nearest_on_triangle;
 use crate::skeleton::{EdgeTable, Skeleton, UnionFind};
@@ -7,46 +8,42 @@ use crate::skeleton::{EdgeTable, Skeleton, UnionFind};
 /// A place is in a member when it is no farther from its middle than this many radii: walls of two runs differ a little.
 const REACH: f64 = 1.25;
 
-/// A sheet or beam, and how it lies to the place that names it.
+/// A sheet or beam.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Member {
     /// Numbers of its quads, ascending.
     pub(super) quads: Vec<usize>,
     /// Numbers of its beam edges, ascending.
     pub(super) beams: Vec<usize>,
-    /// Its point that is nearest to the place, mm.
+    /// Its point that is nearest to the place that names it, mm.
     pub(super) nearest: Vec3,
-    /// How far that is, mm.
-    pub(super) distance: f64,
-    /// How far it may be for the place to be in the member, mm.
-    pub(super) reach: f64,
 }
 
-/// The sheet (quads joined over edges with two quads) nearest to a place, none without quads.
-pub(super) fn sheet_at(skeleton: &Skeleton, place: &Vec3) -> Option<Member> {
+/// The sheet (quads joined over edges with two quads) with a place in its wall.
+///
+/// # Errors
+/// [`Refusal::Nothing`] when the nearest sheet is farther away than its wall.
+pub(super) fn sheet_at(skeleton: &Skeleton, place: &Vec3) -> Result<Member, Refusal> {
     let cells = skeleton.quads.iter().map(|q| &q[..]);
-    let (first, nearest, reach) = nearest(skeleton, cells, place)?;
-    let labels = sheets(skeleton);
-    Some(Member {
-        quads: alike(&labels, first),
+    let (first, nearest) = nearest("sheet", skeleton, cells, place)?;
+    Ok(Member {
+        quads: alike(&sheets(skeleton), first),
         beams: Vec::new(),
         nearest,
-        distance: (nearest - place).norm(),
-        reach,
     })
 }
 
-/// The beam (edges joined at points where two of them and nothing else meet) nearest to a place, none without beams.
-pub(super) fn beam_at(skeleton: &Skeleton, place: &Vec3) -> Option<Member> {
+/// The beam (edges joined at points where two of them and nothing else meet) with a place inside.
+///
+/// # Errors
+/// [`Refusal::Nothing`] when the nearest beam is farther away than it is thick.
+pub(super) fn beam_at(skeleton: &Skeleton, place: &Vec3) -> Result<Member, Refusal> {
     let cells = skeleton.beams.iter().map(|b| &b[..]);
-    let (first, nearest, reach) = nearest(skeleton, cells, place)?;
-    let labels = beams(skeleton);
-    Some(Member {
+    let (first, nearest) = nearest("beam", skeleton, cells, place)?;
+    Ok(Member {
         quads: Vec::new(),
-        beams: alike(&labels, first),
+        beams: alike(&beams(skeleton), first),
         nearest,
-        distance: (nearest - place).norm(),
-        reach,
     })
 }
 
@@ -100,12 +97,13 @@ fn alike(labels: &[u32], one: usize) -> Vec<usize> {
         .collect()
 }
 
-/// The cell nearest to a place, its nearest point, and how far a place may be from it.
+/// The cell nearest to a place and its nearest point.
 fn nearest<'a>(
+    what: &'static str,
     skeleton: &Skeleton,
     cells: impl Iterator<Item = &'a [u32]>,
     place: &Vec3,
-) -> Option<(usize, Vec3, f64)> {
+) -> Result<(usize, Vec3), Refusal> {
     let on = |corners: &[u32]| {
         let p = |k: usize| skeleton.points[corners[k.min(corners.len() - 1)] as usize];
         let halves = [[p(0), p(1), p(2)], [p(0), p(2), p(3)]];
@@ -121,7 +119,15 @@ fn nearest<'a>(
         let radii = corners.iter().map(|&v| skeleton.radii[v as usize]);
         (n, point, REACH * radii.fold(0.0, f64::max))
     });
-    found.min_by(|a, b| (a.1 - place).norm().total_cmp(&(b.1 - place).norm()))
+    let distance = |p: &Vec3| (p - place).norm();
+    match found.min_by(|a, b| distance(&a.1).total_cmp(&distance(&b.1))) {
+        Some((n, nearest, reach)) if distance(&nearest) <= reach => Ok((n, nearest)),
+        found => Err(Refusal::Nothing {
+            what,
+            nearest: found.map_or(*place, |f| f.1),
+            distance: found.map_or(f64::INFINITY, |f| distance(&f.1)),
+        }),
+    }
 }
 
 #[cfg(test)]
@@ -136,7 +142,9 @@ mod tests {
         // Above the middle of one beam: all its edges.
         let member = beam_at(&skeleton, &Vec3::new(10.0, 10.0, 1.0)).expect("there are beams");
         assert_eq!(member.beams.len(), 3);
-        assert!((member.distance - 1.0).abs() < 1e-12 && member.distance <= member.reach);
+        assert!((member.nearest - Vec3::new(10.0, 10.0, 0.0)).norm() < 1e-12);
+        let far = beam_at(&skeleton, &Vec3::new(10.0, 10.0, 3.0));
+        assert!(matches!(far, Err(Refusal::Nothing { what: "beam", .. })));
         let tee = tee();
         assert_eq!(count(&sheets(&tee)), 3);
         let web = sheet_at(&tee, &Vec3::new(20.5, 12.0, 9.0)).expect("there are sheets");

@@ -1,10 +1,12 @@
 //! Edits: a changed skeleton, and the proposal or the body that follows it.
 
+mod bridge;
 mod copy;
 mod delete;
 mod draft;
 mod envelope;
 mod error;
+mod fill;
 #[cfg(test)]
 mod fixtures;
 mod grow;
@@ -14,7 +16,12 @@ mod members;
 mod places;
 mod radii;
 mod region;
+mod rims;
+mod split;
+mod subdivide;
+mod weld;
 
+pub use bridge::Between;
 pub use draft::EditedSkeleton;
 pub use error::{EditListError, Refusal};
 pub use grow::{cells_of, grow};

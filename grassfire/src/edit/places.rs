@@ -44,7 +44,7 @@ pub struct Plane {
 }
 
 /// Ways shorter than this, mm, are rounding: the point stays, and with it the proposal's own surface.
-const STAYS: f64 = 1e-9;
+pub(super) const STAYS: f64 = 1e-9;
 /// Quads and beams must keep this share of their size.
 const FLAT: f64 = 1e-3;
 /// Points may go as far from the box around the skeleton as that is large.

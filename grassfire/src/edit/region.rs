@@ -47,7 +47,7 @@ impl Selection {
     }
 
     /// The selection, when it has quads or beams.
-    pub(super) fn with_cells(self, draft: &EditedSkeleton) -> Result<Self, Refusal> {
+    pub(super) fn with_cells(&self, draft: &EditedSkeleton) -> Result<&Self, Refusal> {
         if self.quads.contains(&true) || self.beams.contains(&true) {
             return Ok(self);
         }
@@ -72,14 +72,12 @@ pub(super) fn select(
 ) -> Result<Selection, Refusal> {
     match region {
         Some(Region::Sheet(at)) => {
-            let place = Vec3::from(*at);
-            let member = sheet_at(&draft.skeleton, &place);
-            of_member("sheet", member, &place, draft)
+            let member = sheet_at(&draft.skeleton, &Vec3::from(*at))?;
+            Ok(of_member(&member, draft))
         }
         Some(Region::Beam(at)) => {
-            let place = Vec3::from(*at);
-            let member = beam_at(&draft.skeleton, &place);
-            of_member("beam", member, &place, draft)
+            let member = beam_at(&draft.skeleton, &Vec3::from(*at))?;
+            Ok(of_member(&member, draft))
         }
         Some(Region::Box { min, max }) => {
             let out = |p: &Vec3, d: usize| (min[d] - p[d]).max(p[d] - max[d]).max(0.0);
@@ -117,27 +115,7 @@ fn within(draft: &EditedSkeleton, distance: impl Fn(&Vec3) -> f64) -> Result<Sel
     })
 }
 
-/// The member, when the place lies in its wall.
-fn of_member(
-    what: &'static str,
-    member: Option<Member>,
-    place: &Vec3,
-    draft: &EditedSkeleton,
-) -> Result<Selection, Refusal> {
-    let Some(member) = member else {
-        return Err(Refusal::Nothing {
-            what,
-            nearest: *place,
-            distance: f64::INFINITY,
-        });
-    };
-    if member.distance > member.reach {
-        return Err(Refusal::Nothing {
-            what,
-            nearest: member.nearest,
-            distance: member.distance,
-        });
-    }
+fn of_member(member: &Member, draft: &EditedSkeleton) -> Selection {
     let skeleton = &draft.skeleton;
     let free = |corners: &[u32]| corners.iter().any(|&v| !draft.kept[v as usize]);
     let mut out = Selection {
@@ -158,5 +136,5 @@ fn of_member(
         hold(&skeleton.beams[b]);
         out.beams[b] = true;
     }
-    Ok(out)
+    out
 }
