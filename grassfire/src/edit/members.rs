@@ -1,4 +1,4 @@
-//! Members of a skeleton, found by a place: sheets and beams.
+//! Members of a skeleton, found by a place: sheets, panels and beams.
 
 use super::error::Refusal;
 use crate::Vec3;
@@ -8,7 +8,10 @@ use crate::skeleton::{EdgeTable, Skeleton, UnionFind};
 /// A place is in a member when it is no farther from its middle than this many radii: walls of two runs differ a little.
 const REACH: f64 = 1.25;
 
-/// A sheet or beam.
+/// Quads of a panel are turned by less than this against the one at its place, degrees.
+const BEND: f64 = 45.0;
+
+/// A sheet, panel or beam.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Member {
     /// Numbers of its quads, ascending.
@@ -31,6 +34,43 @@ pub(super) fn sheet_at(skeleton: &Skeleton, place: &Vec3) -> Result<Member, Refu
         beams: Vec::new(),
         nearest,
     })
+}
+
+/// The panel with a place in its wall: quads that hang together over edges with two quads, and whose normals are within 45 degrees
+/// of that of the quad at the place. A flange or a web of a bent sheet is one.
+///
+/// # Errors
+/// As [`sheet_at`].
+pub(super) fn panel_at(skeleton: &Skeleton, place: &Vec3) -> Result<Member, Refusal> {
+    let cells = skeleton.quads.iter().map(|q| &q[..]);
+    let (first, nearest) = nearest("sheet", skeleton, cells, place)?;
+    let normals: Vec<Vec3> = skeleton.quads.iter().map(|q| normal(skeleton, q)).collect();
+    let along = |q: u32| {
+        let n = &normals[q as usize];
+        n.dot(&normals[first]).abs() > BEND.to_radians().cos() * n.norm() * normals[first].norm()
+    };
+    let table = EdgeTable::of_quads(&skeleton.quads);
+    let mut sets = UnionFind::new(skeleton.quads.len());
+    for (_, faces) in table.iter() {
+        if let [a, b] = faces
+            && along(*a)
+            && along(*b)
+        {
+            sets.join(*a, *b);
+        }
+    }
+    let labels: Vec<u32> = (0..normals.len() as u32).map(|q| sets.find(q)).collect();
+    Ok(Member {
+        quads: alike(&labels, first),
+        beams: Vec::new(),
+        nearest,
+    })
+}
+
+/// Normal of a quad, as long as twice its area.
+fn normal(skeleton: &Skeleton, q: &[u32; 4]) -> Vec3 {
+    let p = q.map(|v| skeleton.points[v as usize]);
+    (p[2] - p[0]).cross(&(p[3] - p[1]))
 }
 
 /// The beam (edges joined at points where two of them and nothing else meet) with a place inside.
@@ -154,5 +194,13 @@ mod tests {
                 .any(|&v| tee.points[v as usize].z > 1.0)
         };
         assert!(!web.quads.is_empty() && web.quads.iter().all(of_web));
+        // Without its left half the base and the web are one sheet with a bend.
+        let mut angle = tee.clone();
+        angle
+            .quads
+            .retain(|q| q.iter().all(|&v| tee.points[v as usize].x >= 20.0));
+        assert_eq!(count(&sheets(&angle)), 1);
+        let web = panel_at(&angle, &Vec3::new(20.5, 12.0, 9.0)).expect("there are sheets");
+        assert_eq!((web.quads.len(), angle.quads.len()), (6, 12));
     }
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::draft::EditedSkeleton;
 use super::error::Refusal;
-use super::members::{Member, beam_at, sheet_at};
+use super::members::{Member, beam_at, panel_at, sheet_at};
 use crate::Vec3;
 
 /// Where an edit acts. It names a place, not points, so that it can be replayed on another proposal.
@@ -28,6 +28,8 @@ pub enum Region {
     },
     /// The sheet with a place inside its wall, mm.
     Sheet([f64; 3]),
+    /// The panel with a place inside its wall, mm: the part of its sheet that is turned by less than 45 degrees against the place.
+    Panel([f64; 3]),
     /// The beam with a place inside, from junction to junction, mm.
     Beam([f64; 3]),
 }
@@ -64,7 +66,7 @@ impl Selection {
 
 /// What `region` holds, everything when there is none.
 ///
-/// Box and ball: the points inside, and the quads and beams with all points inside. Sheet and beam: the whole member, and its
+/// Box and ball: the points inside, and the quads and beams with all points inside. Sheet, panel and beam: the whole member, and its
 /// points. Points of non-design bodies are never held, quads and beams with nothing else neither.
 pub(super) fn select(
     region: Option<&Region>,
@@ -73,6 +75,10 @@ pub(super) fn select(
     match region {
         Some(Region::Sheet(at)) => {
             let member = sheet_at(&draft.skeleton, &Vec3::from(*at))?;
+            Ok(of_member(&member, draft))
+        }
+        Some(Region::Panel(at)) => {
+            let member = panel_at(&draft.skeleton, &Vec3::from(*at))?;
             Ok(of_member(&member, draft))
         }
         Some(Region::Beam(at)) => {
