@@ -45,17 +45,17 @@ pub(super) fn depths(hulls: &[Hull], layout: &VoxelGrid<f32>, reach: f64) -> Vec
 
 /// First voxel in, and first beyond, the box around a hull and `reach`.
 fn voxels_of(hull: &Hull, layout: &VoxelGrid<f32>, reach: f64) -> [[usize; 3]; 2] {
-    let mut out = [[0; 3]; 2];
-    for d in 0..3 {
+    let ends = [0, 1, 2].map(|d| {
         let low = hull.iter().map(|b| b.centre[d] - b.radius);
         let high = hull.iter().map(|b| b.centre[d] + b.radius);
         let low = low.fold(f64::INFINITY, f64::min) - reach - layout.origin[d];
         let high = high.fold(f64::NEG_INFINITY, f64::max) + reach - layout.origin[d];
         let limit = layout.dims[d] as f64;
-        out[0][d] = (low / layout.spacing).ceil().clamp(0.0, limit) as usize;
-        out[1][d] = ((high / layout.spacing).floor() + 1.0).clamp(0.0, limit) as usize;
-    }
-    out
+        let first = (low / layout.spacing).ceil().clamp(0.0, limit);
+        let beyond = ((high / layout.spacing).floor() + 1.0).clamp(0.0, limit);
+        [first as usize, beyond as usize]
+    });
+    [ends.map(|e| e[0]), ends.map(|e| e[1])]
 }
 
 /// Largest radius minus distance over the balls of a hull.

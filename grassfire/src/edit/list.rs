@@ -1,7 +1,10 @@
 //! Edits of the proposal's skeleton as an ordered list that is replayed on every run.
 
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::bridge::Between;
 use super::draft::EditedSkeleton;
@@ -171,6 +174,17 @@ impl Edit {
     }
 }
 
+/// The entry of a list that says the same, as JSON.
+impl fmt::Display for Edit {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let mut value = json!(self);
+        if let Some(keys) = value.as_object_mut() {
+            keys.retain(|_, v| !(v.is_null() || *v == json!(false) || *v == json!(0)));
+        }
+        value.fmt(f)
+    }
+}
+
 /// Refuses edits that mean nothing.
 ///
 /// # Errors
@@ -203,6 +217,21 @@ pub fn edit(
         draft.done.push(done);
     }
     Ok(draft)
+}
+
+impl EditedSkeleton {
+    /// One more edit at the end of the list; nothing changes when it is refused.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn add(&mut self, edit: &Edit, least: f64) -> Result<(), Refusal> {
+        edit.check()?;
+        let mut draft = self.clone();
+        let done = apply(&mut draft, edit, least)?;
+        draft.done.push(done);
+        *self = draft;
+        Ok(())
+    }
 }
 
 fn apply(draft: &mut EditedSkeleton, edit: &Edit, least: f64) -> Result<Edited, Refusal> {
@@ -362,6 +391,23 @@ mod tests {
         };
         let edited = edit(&skeleton, &[false; 5], &[smooth], 0.5).expect("a good edit");
         assert_eq!(edited.skeleton.radii, [2.0, 2.0, 2.0, 2.0, 4.0]);
+    }
+
+    #[test]
+    fn an_edit_shows_as_its_entry() {
+        let edit = Edit {
+            within: Some(Region::Panel([1.0, 2.0, 3.5])),
+            delete: true,
+            ..Edit::default()
+        };
+        // The order of the keys depends on a feature of serde_json that other crates may turn on.
+        let short = json!({"within": {"panel": [1.0, 2.0, 3.5]}, "delete": true});
+        let text = edit.to_string();
+        assert_eq!(
+            serde_json::from_str::<serde_json::Value>(&text).ok(),
+            Some(short)
+        );
+        assert_eq!(serde_json::from_str::<Edit>(&text).ok(), Some(edit));
     }
 
     #[test]

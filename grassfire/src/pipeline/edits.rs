@@ -5,7 +5,9 @@ use super::bodies::Bodies;
 use super::error::{PipelineError, StageError};
 use super::feeding::{belonging, keep_free, solid_of};
 use super::record::Record;
-use crate::edit::{Edited, check_edits, edit, material};
+use crate::Vec3;
+use crate::casting::mould::{MouldOptions, Repair, conflicts};
+use crate::edit::{Edited, EditedSkeleton, check_edits, edit, material};
 use crate::medial;
 use crate::mesh::{Bvh, Winding};
 use crate::monitor::Monitor;
@@ -20,10 +22,12 @@ const STAGE: &str = "edit";
 /// Walls are kept this many voxels thick at least, as radii.
 const LEAST: f64 = 1.0;
 
-/// The proposal with the edits of the options; none when there are none.
+/// The proposal with the edits of the options, and with those of a mould repair that turns or removes members; none when there are
+/// none.
 ///
 /// 1. The skeleton of the proposal and its radii; points that belong to non-design bodies are kept.
-/// 2. The edits in their order ([`edit`]).
+/// 2. The edits in their order ([`edit`]), then those of the repair ([`conflicts`]); one of these that is refused is left out with
+///    a warning.
 /// 3. The proposal's field follows ([`material`]): it moves by what radii changed, loses what was moved or deleted and gets what
 ///    was moved or made. Nothing comes off non-design bodies.
 /// 4. It is remeshed: where gaps close or walls vanish, the topology changes here, with a warning, and is known to all later
@@ -38,7 +42,7 @@ pub(super) fn edited(
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Option<Remeshed>, PipelineError> {
-    if options.edits.is_empty() {
+    if options.edits.is_empty() && !options.mould.repair.edits_members() {
         return Ok(None);
     }
     record.stage("options", || check_edits(&options.edits))?;
@@ -52,9 +56,10 @@ pub(super) fn edited(
         Ok::<_, StageError>(quads.skeleton)
     })?;
     let kept = belonging(bodies, &before.points, &before.radii);
-    let edited = record.stage(STAGE, || {
+    let mut edited = record.stage(STAGE, || {
         edit(&before, &kept, &options.edits, LEAST * voxel)
     })?;
+    part_members(&mut edited, &options.mould, voxel, monitor);
     for (number, done) in edited.done.iter().enumerate() {
         if let Some(text) = topology_change(done) {
             monitor.warn(STAGE, format!("edits[{number}] ({}) {text}", done.kind));
@@ -79,6 +84,32 @@ pub(super) fn edited(
         edits: edited.done,
     });
     Ok(Some(changed))
+}
+
+/// Turns or removes members that shadow each other along the draw direction, when the repair is of that kind.
+fn part_members(
+    edited: &mut EditedSkeleton,
+    options: &MouldOptions,
+    voxel: f64,
+    monitor: &Monitor,
+) {
+    let Some(draw) = options.draw.filter(|_| options.repair.edits_members()) else {
+        return;
+    };
+    let draw = Vec3::from(draw).normalize();
+    for conflict in conflicts(&edited.skeleton, &draw, voxel) {
+        let edits = match options.repair {
+            Repair::Turn => conflict.turn.to_vec(),
+            _ => vec![conflict.remove],
+        };
+        for one in edits {
+            let said = match edited.add(&one, LEAST * voxel) {
+                Ok(()) => format!("the repair adds the edit {one}"),
+                Err(why) => format!("an edit of the repair is left out, because it {why}: {one}"),
+            };
+            monitor.warn(STAGE, said);
+        }
+    }
 }
 
 /// What an edit changed of the skeleton's topology, none when it kept it.

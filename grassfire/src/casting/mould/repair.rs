@@ -23,8 +23,19 @@ pub enum Repair {
     /// Everything between the lowest and the highest material of a line is filled: the least part that leaves the mould and
     /// holds the given one.
     Fill,
+    /// Of two members with a room between them that only a core makes, the lesser is taken away; what is left undercut is filled.
+    Remove,
+    /// Such members are turned by 90 degrees about their long axes, so that they stand along the draw direction; the rest is filled.
+    Turn,
     /// Every line keeps the interval that is worth most: material counts 1, filling costs `mould.fill_cost`.
     Keep,
+}
+
+impl Repair {
+    /// Whether members of the skeleton are edited first.
+    pub fn edits_members(self) -> bool {
+        matches!(self, Self::Remove | Self::Turn)
+    }
 }
 
 /// How undercuts are removed.
@@ -96,7 +107,7 @@ pub fn repair(
     let before = multiple(&field);
     match options.kind {
         Repair::Off => {}
-        Repair::Fill => fill(&mut field),
+        Repair::Fill | Repair::Remove | Repair::Turn => fill(&mut field),
         Repair::Keep => {
             keep(&mut field, options.fill_cost);
             if let Some((pieces, lost)) = drop_loose(&mut field) {
