@@ -327,6 +327,9 @@ pub struct DemoArgs {
     /// The light wishbone of the paper's geometry II on voxels of 1.875 mm: some ten minutes instead of one
     #[arg(long)]
     pub fine: bool,
+    /// The paper's variants I to IV, free and drawn, as optimized and edited for casting, side by side: some ten minutes
+    #[arg(long, conflicts_with = "fine")]
+    pub all: bool,
     /// Folder for the results [default: out/EXAMPLE]
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,

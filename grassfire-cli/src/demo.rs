@@ -1,5 +1,7 @@
 //! `grassfire demo`: the whole chain on a project file that is part of the program.
 
+mod variants;
+
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -25,6 +27,9 @@ pub fn command(args: &DemoArgs) -> Result<u8, Failure> {
     let Example::Wishbone = args.example;
     let output = args.output.clone();
     let output = output.unwrap_or_else(|| PathBuf::from("out/wishbone"));
+    if args.all {
+        return variants::command(&output, &args.run);
+    }
     let text = if args.fine { FINE } else { WISHBONE };
     let path = unpack(&output.join("input"), "case.toml", text.as_bytes())?;
     let job = RunJob {

@@ -163,6 +163,21 @@ pub fn run(
     args: &RunArgs,
     work: impl FnOnce(&Monitor) -> Result<Outcome, PipelineError>,
 ) -> Result<u8, Failure> {
+    let outcome = guarded(threads, args, work)?;
+    say(&outcome, output, args)?;
+    Ok(if outcome.failed_checks.is_empty() {
+        0
+    } else {
+        1
+    })
+}
+
+/// Runs `work` with threads, progress and Ctrl-C set up; prints its warnings.
+pub fn guarded<T>(
+    threads: usize,
+    args: &RunArgs,
+    work: impl FnOnce(&Monitor) -> Result<T, PipelineError>,
+) -> Result<T, Failure> {
     let talk = match (args.quiet, args.verbose) {
         (true, _) => Talk::Quiet,
         (_, true) => Talk::Verbose,
@@ -182,13 +197,7 @@ pub fn run(
             eprintln!("warning: {}: {}", warning.stage, warning.text);
         }
     }
-    let outcome = result?;
-    say(&outcome, output, args)?;
-    Ok(if outcome.failed_checks.is_empty() {
-        0
-    } else {
-        1
-    })
+    Ok(result?)
 }
 
 /// The first Ctrl-C asks the stages to stop, the second ends the program at once.

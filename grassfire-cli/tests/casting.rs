@@ -126,6 +126,11 @@ fn freezing_without_data_or_sand_and_moulds_without_undercut_are_refused() {
             ],
             "mould.cores",
         ),
+        (
+            "mould",
+            vec!["--draw", "0,0,1", "--set", "mould.repair=turn"],
+            "skeleton",
+        ),
     ] {
         let output = command(name, folder.path(), &args);
         let stderr = String::from_utf8_lossy(&output.stderr);
@@ -158,4 +163,80 @@ fn a_proposal_with_an_undercut_is_filled_before_its_skeleton_is_made() {
     let left = number(&report, "/mould/undercut_volume");
     let hole = std::f64::consts::PI * HOLE * HOLE * THICK;
     assert!(left < 0.1 * hole, "{left}");
+}
+
+/// A prism along y as binary STL; its section is made of rectangles (low x, low z, high x, high z) that share whole edges.
+fn prism(section: &[[f32; 4]], length: f32) -> Vec<u8> {
+    let corners = |[a, b, c, d]: [f32; 4]| [[a, b], [c, b], [c, d], [a, d]];
+    let edges = |rectangle| {
+        let c = corners(rectangle);
+        [0, 1, 2, 3].map(|k| [c[k], c[(k + 1) % 4]])
+    };
+    let all: Vec<[[f32; 2]; 2]> = section.iter().flat_map(|r| edges(*r)).collect();
+    let at = |[x, z]: [f32; 2], y: f32| [x, y, z];
+    let mut quads: Vec<[[f32; 3]; 4]> = Vec::new();
+    for rectangle in section {
+        let c = corners(*rectangle);
+        quads.push(c.map(|p| at(p, 0.0)));
+        quads.push([c[3], c[2], c[1], c[0]].map(|p| at(p, length)));
+        for [a, b] in edges(*rectangle) {
+            if !all.contains(&[b, a]) {
+                quads.push([at(a, 0.0), at(a, length), at(b, length), at(b, 0.0)]);
+            }
+        }
+    }
+    let mut out = vec![0; 80];
+    out.extend((2 * quads.len() as u32).to_le_bytes());
+    for [a, b, c, d] in quads {
+        for triangle in [[a, b, c], [a, c, d]] {
+            out.extend([0; 12]);
+            out.extend(triangle.iter().flatten().flat_map(|x| x.to_le_bytes()));
+            out.extend([0; 2]);
+        }
+    }
+    out
+}
+
+/// A channel with its open side across the draw: without its smaller flange nothing has to be filled.
+#[test]
+fn the_lesser_of_two_members_with_a_room_between_is_removed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let part = folder.path().join("channel.stl");
+    let section = [
+        [0.0, 0.0, 4.0, 4.0],
+        [0.0, 4.0, 4.0, 24.0],
+        [0.0, 24.0, 4.0, 28.0],
+        [4.0, 0.0, 16.0, 4.0],
+        [4.0, 24.0, 22.0, 28.0],
+    ];
+    std::fs::write(&part, prism(&section, 40.0)).expect("writes");
+    let args = [
+        "--draw",
+        "0,0,1",
+        "--set",
+        "mould.repair=remove",
+        "--recognise",
+        "off",
+        "--voxel",
+        "0.8",
+    ];
+    let run = reconstruct(&part, &folder.path().join("out"), &args);
+    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+    let said = run.lines("warning: edit: the repair adds the edit {");
+    assert!(
+        said.len() == 1 && said[0].contains("\"delete\":true"),
+        "{}",
+        run.stderr
+    );
+    let report = run.report();
+    assert_eq!(report["edits"]["edits"][0]["kind"], "delete");
+    assert_eq!(number(&report, "/mould/multiple_lines"), 0.0);
+    // Web and upper flange, and the foot at which the lower one was; filled it would be a block 16 mm wide and more.
+    let angle = (28.0 + 22.0 - 4.0) * 4.0 * 40.0;
+    let block = 28.0 * 16.0 * 40.0;
+    let volume = number(&report, "/volume/solid");
+    assert!(
+        volume > angle && volume < 0.6 * block,
+        "{volume} {angle} {block}"
+    );
 }

@@ -59,6 +59,61 @@ fn edits_thicken_their_place_only() {
     assert!(refused.stderr.contains("mm away"), "{}", refused.stderr);
 }
 
+/// The upper rim moves 8 mm outward, then a quarter of the ring goes: a longer C, still a good part.
+#[test]
+fn edits_move_and_delete_members() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let edits = r#"edits=[{"within":{"box":{"min":[-100,15,-100],"max":[100,100,100]}},"move":[0,8,0]},
+        {"within":{"box":{"min":[-100,-100,-100],"max":[0,0,100]}},"delete":true}]"#;
+    let run = run_plate(folder.path(), &["--recognise", "off", "--set", edits]);
+    let report = run.report();
+    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+    let done = |key: &str| report["edits"]["edits"].pointer(key).cloned();
+    assert_eq!(done("/0/kind"), Some("move".into()));
+    assert_eq!(done("/0/moved"), Some(8.0.into()));
+    assert_eq!(done("/0/before/topology"), done("/0/after/topology"));
+    assert_eq!(done("/0/largest_change"), Some(0.0.into()));
+    let loops = ["/1/before/topology/b1", "/1/after/topology/b1"].map(done);
+    assert_eq!(loops, [Some(1.into()), Some(0.into())]);
+    assert!(run.stderr.contains("loops from 1 to 0"), "{}", run.stderr);
+    assert!(run.stderr.contains("genus from 1 to 0"), "{}", run.stderr);
+    // A strip of 8 mm came, less than a quarter of the ring went: what is left of it ends round.
+    let strip = SIDE * 8.0 * THICK;
+    let quarter = (SIDE * SIDE / 4.0 - HOLE * HOLE * std::f64::consts::FRAC_PI_4) * THICK;
+    let volume = |when: &str| number(&report, &format!("/edits/volume_{when}"));
+    let came = volume("after") - volume("before");
+    let wanted = strip - quarter;
+    assert!((came - wanted).abs() < 0.25 * quarter, "{came} {wanted}");
+    assert_eq!(
+        report["body"]["self_intersections"], 0,
+        "{}",
+        report["body"]
+    );
+    if cfg!(feature = "occt") {
+        assert_eq!(report["solid"]["valid"], true);
+    }
+}
+
+/// A second plate above the first, and walls from outer rim to outer rim: a box with a hole in its lid and in its bottom.
+#[test]
+fn edits_copy_and_bridge_members() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let edits =
+        r#"edits=[{"duplicate":[0,0,14]},{"bridge":{"from":[17.5,0,16.5],"to":[17.5,0,2.5]}}]"#;
+    let run = run_plate(folder.path(), &["--recognise", "off", "--set", edits]);
+    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+    let report = run.report();
+    let pieces = |n: usize| report["edits"]["edits"][n]["after"]["topology"]["b0"].clone();
+    assert_eq!([pieces(0), pieces(1)], [2, 1]);
+    let topology = &report["topology"]["solid"];
+    assert_eq!((&topology["b0"], &topology["b1"]), (&1.into(), &2.into()));
+    assert_eq!(
+        report["body"]["self_intersections"], 0,
+        "{}",
+        report["body"]
+    );
+}
+
 #[test]
 fn skeleton_comes_back_as_ply_and_as_obj() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -75,6 +75,13 @@ impl Monitor {
         }
     }
 
+    /// Forgets the warnings, so that the next of several runs starts without them.
+    pub fn clear_warnings(&self) {
+        if let Ok(mut list) = self.warnings.lock() {
+            list.clear();
+        }
+    }
+
     /// All warnings so far, in order.
     pub fn warnings(&self) -> Vec<Warning> {
         self.warnings

@@ -37,7 +37,7 @@ pub use casting::{SolidJob, mould_solid, solidify_solid};
 pub use error::{PipelineError, StageError};
 pub use exchange::{FileOptions, Format};
 pub use optimize::{OptimizeJob, check_case, optimize};
-pub use run::{RunJob, Stage, run};
+pub use run::{RunJob, Stage, run, share_optimization};
 pub use shape::RetryOptions;
 pub use verify::{VerifyJob, verify_solid};
 
@@ -46,7 +46,7 @@ use crate::case::Body;
 use crate::casting::feed::FeedOptions;
 use crate::casting::mould::MouldOptions;
 use crate::casting::solidify::SolidifyOptions;
-use crate::edit::RadiusEdit;
+use crate::edit::Edit;
 use crate::fit::FitOptions;
 use crate::io::ReadOptions;
 use crate::medial::{self, MedialOptions, PoleOptions};
@@ -94,8 +94,8 @@ pub struct ReconstructOptions {
     pub thicken: ThickenOptions,
     /// Fit to the proposal.
     pub fit: FitOptions,
-    /// Edits of the radii of the proposal's skeleton, in their order.
-    pub edits: Vec<RadiusEdit>,
+    /// Edits of the proposal's skeleton, in their order.
+    pub edits: Vec<Edit>,
     /// Sections that grow towards the feeders.
     pub feed: FeedOptions,
     /// What to do when a body cuts itself.
@@ -158,8 +158,8 @@ pub struct Outcome {
 ///
 /// 1. Reads the proposal and the non-design bodies; repairs the mesh; recognises bores and bosses in it.
 /// 2. Remeshes it on voxels to a closed solid and removes topological noise.
-/// 3. Computes wall thickness (poles).
-/// 4. With a draw direction and a repair, takes undercuts away; with feeders, lets the proposal's sections grow towards them.
+/// 3. Replays the list of edits; with a draw direction and a repair, takes undercuts away. Computes wall thickness (poles).
+/// 4. With feeders, lets the proposal's sections grow towards them.
 /// 5. Cuts the non-design bodies out; steps 6 to 9 are done with what is left, and once more with the whole proposal when
 ///    that does not give a valid union.
 /// 6. Computes the pruned medial axis; builds the quad skeleton (or reads the given one), maps and smooths its radii.
@@ -241,28 +241,29 @@ fn rebuild(
         inputs::remesh(&proposal, &bodies, options, monitor)
     })?;
     record.report.remesh = Some(measure::remesh_block(&remeshed));
-    let remeshed = match casting::drawn_out(record, &remeshed, &bodies, options, monitor)? {
-        Some(repaired) => repaired,
-        None => remeshed,
+    let edited = edits::edited(record, &remeshed, &bodies, options, monitor)?;
+    // Undercuts last: whatever the edits did, none are left.
+    let from = edited.as_ref().unwrap_or(&remeshed);
+    let repaired = casting::drawn_out(record, from, &bodies, options, monitor)?;
+    let (shown, original) = match (edited, repaired) {
+        (None, repaired) => (None, repaired.unwrap_or(remeshed)),
+        (Some(edited), repaired) => (Some(remeshed), repaired.unwrap_or(edited)),
     };
+    let shown = shown.as_ref().unwrap_or(&original);
     let placed;
     let options = if options.feed.feeders.is_empty() {
         options
     } else {
-        placed = record.stage("feed", || feeding::placed(options, &remeshed, monitor))?;
+        placed = record.stage("feed", || feeding::placed(options, &original, monitor))?;
         &placed
     };
     let delivery = record.stage("write", || Delivery::open(&job.output, deliver::FILES))?;
-    record.stage("write", || delivery.proposal(&remeshed.solid))?;
+    record.stage("write", || delivery.proposal(&shown.solid))?;
 
     let poles = record.stage("poles", || {
-        medial::poles(&remeshed.solid, &options.poles, monitor)
+        medial::poles(&shown.solid, &options.poles, monitor)
     })?;
-    record.stage("write", || delivery.poles(&poles, &remeshed.solid))?;
-    let original = match edits::edited(record, &remeshed, &bodies, options, monitor)? {
-        Some(edited) => edited,
-        None => remeshed,
-    };
+    record.stage("write", || delivery.poles(&poles, &shown.solid))?;
     let fed = match drawn {
         // The radii of a drawn skeleton are what its author wants: they are edited, not the proposal.
         Some(_) => None,

@@ -8,7 +8,7 @@ use crate::skeleton::Skeleton;
 use crate::voxel::VoxelGrid;
 
 /// Voxels of certain emptiness kept around everything.
-const MARGIN: f64 = 3.0;
+pub(super) const MARGIN: f64 = 3.0;
 
 /// `field` with its surface moved outward by the growth of the radii of the nearest place on the skeleton.
 ///
@@ -32,7 +32,8 @@ pub fn grow(
         return field.clone();
     }
     let h = field.spacing;
-    let out = padded(field, (most / h).ceil() as usize + 1);
+    let by = [(most / h).ceil() as usize + 1; 3];
+    let out = padded(field, by, by);
     let reach = most.max(-least) + MARGIN * h;
     let distances = Bvh::new(surface);
     let places = Bvh::new(cells);
@@ -58,17 +59,18 @@ pub fn grow(
     VoxelGrid { values, ..out }
 }
 
-/// The same field on a grid that is larger by `by` voxels on every side, empty there.
-fn padded(field: &VoxelGrid<f32>, by: usize) -> VoxelGrid<f32> {
+/// The same field on a grid that is larger by `low` and `high` voxels at the lower and upper ends of its axes, empty there.
+pub(super) fn padded(field: &VoxelGrid<f32>, low: [usize; 3], high: [usize; 3]) -> VoxelGrid<f32> {
     let h = field.spacing;
-    let dims = field.dims.map(|n| n + 2 * by);
-    let origin = field.origin - Vec3::repeat(by as f64 * h);
-    let far = -(by as f64 + MARGIN) * h;
+    let dims = [0, 1, 2].map(|d| low[d] + field.dims[d] + high[d]);
+    let origin = field.origin - Vec3::from(low.map(|n| n as f64 * h));
+    let most = low.into_iter().chain(high).max().unwrap_or(0);
+    let far = -(most as f64 + MARGIN) * h;
     let mut out = VoxelGrid::filled(origin, h, dims, far as f32);
     for k in 0..field.dims[2] {
         for j in 0..field.dims[1] {
             let from = field.index(0, j, k);
-            let to = out.index(by, j + by, k + by);
+            let to = out.index(low[0], j + low[1], k + low[2]);
             let row = field.dims[0];
             out.values[to..to + row].copy_from_slice(&field.values[from..from + row]);
         }
@@ -91,7 +93,7 @@ pub fn cells_of(skeleton: &Skeleton) -> TriMesh {
 }
 
 /// Value at `p` in a triangle, or on the segment that it is when its last two corners are one point.
-fn interpolate(mesh: &TriMesh, corners: [u32; 3], p: &Vec3, values: &[f64]) -> f64 {
+pub(super) fn interpolate(mesh: &TriMesh, corners: [u32; 3], p: &Vec3, values: &[f64]) -> f64 {
     let [a, b, c] = corners.map(|v| mesh.points[v as usize]);
     let [va, vb, vc] = corners.map(|v| values[v as usize]);
     let (u, v, w) = (b - a, c - a, p - a);

@@ -95,6 +95,10 @@ const MOULD_FILES: &[(&str, &str)] = &[
 pub fn mould_solid(job: &SolidJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
     let options = &job.options;
     let mut record = Record::start(&job.command);
+    record.stage("options", || match options.mould.repair {
+        repair if repair.edits_members() => Err(mould::MouldError::NoSkeleton),
+        _ => Ok(()),
+    })?;
     let mesh = record.stage("read", || solid(job, monitor))?;
     record.report.inputs = record.stage("read", || {
         inputs::fingerprint(&job.part, monitor).map(|file| vec![file])

@@ -12,7 +12,7 @@ use super::optimize::{self, OptimizeJob};
 use super::record::Record;
 use super::{Outcome, ReconstructJob, exchange, finish, inputs, rebuild, tetrahedra, verify};
 use crate::case::Case;
-use crate::io;
+use crate::io::{self, IoError};
 use crate::monitor::{Cancelled, Monitor};
 use crate::report::{InputFile, OptimizeBlock, Picture};
 use crate::verify::{VerifyOptions, check_options};
@@ -235,6 +235,24 @@ fn cached(output: &Path, key: &str) -> Option<OptimizeBlock> {
     (cache.key == key && LEFT.iter().all(same)).then_some(cache.block)
 }
 
+/// Copies what an optimization left to another folder: a run of the same problem there takes it instead of optimizing again,
+/// whatever its later stages are.
+///
+/// # Errors
+/// Files that cannot be read or written: [`IoError`] in the stage `write`.
+pub fn share_optimization(from: &Path, to: &Path) -> Result<(), PipelineError> {
+    let copy = |name: &&str| std::fs::copy(from.join(name), to.join(name)).map(drop);
+    let copied =
+        std::fs::create_dir_all(to).and_then(|()| LEFT.iter().chain([&CACHE]).try_for_each(copy));
+    copied.map_err(|source| PipelineError {
+        stage: "write",
+        source: StageError::Io(IoError::Write {
+            file: to.display().to_string(),
+            source,
+        }),
+    })
+}
+
 /// Notes what the optimization was made from.
 fn remember(block: &OptimizeBlock, output: &Path, key: &str) -> Result<(), StageError> {
     let mut cache = Cache {
@@ -277,7 +295,10 @@ mod tests {
             ..OptimizeBlock::default()
         };
         remember(&block, output, &first).expect("writable");
-        assert_eq!(cached(output, &first), Some(block));
+        assert_eq!(cached(output, &first).as_ref(), Some(&block));
+        let other = output.join("other");
+        share_optimization(output, &other).expect("writable");
+        assert_eq!(cached(&other, &first), Some(block));
         // Other stages do not matter.
         case.reconstruct.feed.growth = 0.5;
         case.verify.h = Some(1.0);

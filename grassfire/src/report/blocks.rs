@@ -41,7 +41,7 @@ pub struct Report {
     /// Volume of the solid against the proposal.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume: Option<VolumeBlock>,
-    /// The edits of radii.
+    /// The list of edits.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub edits: Option<EditBlock>,
     /// The feeding edit.

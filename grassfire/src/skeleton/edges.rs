@@ -42,6 +42,12 @@ impl EdgeTable {
         table
     }
 
+    /// The table of quads, numbered in their order.
+    pub fn of_quads(quads: &[[u32; 4]]) -> Self {
+        let faces = quads.iter().enumerate();
+        Self::new(faces.map(|(number, quad)| (number as u32, &quad[..])))
+    }
+
     /// Faces of edge number `i`.
     #[inline]
     pub fn faces(&self, i: usize) -> &[u32] {

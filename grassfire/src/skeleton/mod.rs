@@ -26,6 +26,7 @@ mod walk;
 
 pub use build::{SkeletonOptions, quad_skeleton};
 pub use check::check;
+pub(crate) use edges::{EdgeTable, UnionFind, edge};
 pub use error::SkeletonError;
 pub(crate) use nearest::PointGrid;
 pub use stats::{Deviation, Range, SkeletonStats, stats, topology};

@@ -59,13 +59,7 @@ pub fn topology(skeleton: &Skeleton) -> Betti {
 
 /// Figures of any skeleton that passes [`super::check`].
 pub fn stats(skeleton: &Skeleton) -> SkeletonStats {
-    let table = EdgeTable::new(
-        skeleton
-            .quads
-            .iter()
-            .enumerate()
-            .map(|(i, q)| (i as u32, &q[..])),
-    );
+    let table = EdgeTable::of_quads(&skeleton.quads);
     let mut radii: Vec<f64> = skeleton
         .radii
         .iter()

@@ -1,5 +1,6 @@
 //! The mould: undercuts, parting, draft, walls, the best draw direction, and repair.
 
+mod conflicts;
 mod cores;
 pub mod dexels;
 pub mod directions;
@@ -14,6 +15,7 @@ mod walls;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use conflicts::{Conflict, conflicts};
 pub use dexels::{Dexels, Lattice, dexels, dexels_on};
 pub use directions::{Direction, best_direction};
 pub use draft::DraftClass;
@@ -157,6 +159,9 @@ pub enum MouldError {
         /// What is allowed.
         allowed: &'static str,
     },
+    /// Members are to be edited of a part whose skeleton is not known.
+    #[error("mould.repair turns or removes members of a skeleton; a finished solid has none")]
+    NoSkeleton,
     /// Nothing there.
     #[error("the part has no surface")]
     Empty,
@@ -186,6 +191,9 @@ impl MouldError {
             Self::Option { .. } => Some("`grassfire schema` lists all options".to_owned()),
             Self::Core { .. } => {
                 Some("the report of `grassfire mould` lists the undercuts with their places".into())
+            }
+            Self::NoSkeleton => {
+                Some("`grassfire reconstruct` does that, or take mould.repair=fill".into())
             }
             Self::Grid { source, .. } => source.hint(),
             Self::Empty | Self::Cancelled(_) => None,

@@ -3,10 +3,11 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::MouldError;
 use super::cores::cored;
 use super::dexels::axes;
+use super::{MouldError, STAGE};
 use crate::Vec3;
+use crate::fe::components;
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
 use crate::remesh::{Capsule, RemeshError, RemeshOptions, remesh, remesh_density};
@@ -22,8 +23,19 @@ pub enum Repair {
     /// Everything between the lowest and the highest material of a line is filled: the least part that leaves the mould and
     /// holds the given one.
     Fill,
+    /// Of two members with a room between them that only a core makes, the lesser is taken away; what is left undercut is filled.
+    Remove,
+    /// Such members are turned by 90 degrees about their long axes, so that they stand along the draw direction; the rest is filled.
+    Turn,
     /// Every line keeps the interval that is worth most: material counts 1, filling costs `mould.fill_cost`.
     Keep,
+}
+
+impl Repair {
+    /// Whether members of the skeleton are edited first.
+    pub fn edits_members(self) -> bool {
+        matches!(self, Self::Remove | Self::Turn)
+    }
 }
 
 /// How undercuts are removed.
@@ -63,7 +75,8 @@ pub struct Repaired {
 /// 2. [`Repair::Fill`]: every value becomes at least the smaller of the largest values above and below it on its line. All
 ///    level sets of the result are single intervals, so the surface between voxels is, too.
 /// 3. [`Repair::Keep`]: on every line the interval with the largest sum of +1 a solid and `-cost` an empty voxel (Kadane's
-///    maximum subarray, exact); what lies outside goes, what lies inside is filled as above.
+///    maximum subarray, exact); what lies outside goes, what lies inside is filled as above. Pieces that hang on nothing
+///    any more go, too, with a warning.
 /// 4. Draft: from both ends towards `parting`, every value becomes at least the one before plus the tangent of the draft
 ///    times the step.
 /// 5. The surface is extracted and turned back.
@@ -94,8 +107,18 @@ pub fn repair(
     let before = multiple(&field);
     match options.kind {
         Repair::Off => {}
-        Repair::Fill => fill(&mut field),
-        Repair::Keep => keep(&mut field, options.fill_cost),
+        Repair::Fill | Repair::Remove | Repair::Turn => fill(&mut field),
+        Repair::Keep => {
+            keep(&mut field, options.fill_cost);
+            if let Some((pieces, lost)) = drop_loose(&mut field) {
+                monitor.warn(
+                    STAGE,
+                    format!(
+                        "the repair cut off {pieces} pieces of {lost:.0} mm3, which are left out"
+                    ),
+                );
+            }
+        }
     }
     if options.draft > 0.0 {
         add_draft(
@@ -226,6 +249,25 @@ fn keep(field: &mut VoxelGrid<f32>, cost: f64) {
     });
 }
 
+/// Empties all pieces but the largest; gives how many there were and their volume, mm3, none when there is one.
+fn drop_loose(field: &mut VoxelGrid<f32>) -> Option<(usize, f64)> {
+    let solid: Vec<bool> = field.values.iter().map(|f| *f > 0.0).collect();
+    let (labels, pieces) = components(field.dims, &solid);
+    let sizes = pieces.iter().enumerate().map(|(n, p)| (p.size, n));
+    let largest = sizes.max()?.1 as u32;
+    if pieces.len() < 2 {
+        return None;
+    }
+    let loose = |label: u32| label != u32::MAX && label != largest;
+    let (mut lost, out) = (0, -0.5 * field.spacing as f32);
+    for (value, _) in (field.values.iter_mut().zip(labels)).filter(|(_, label)| loose(*label)) {
+        *value = out;
+        lost += 1;
+    }
+    let volume = f64::from(lost) * field.spacing.powi(3);
+    Some((pieces.len() - 1, volume))
+}
+
 /// First and last of the interval with the largest positive sum (Kadane); none when no value is positive.
 fn best_interval(worth: impl Iterator<Item = f64>) -> Option<[usize; 2]> {
     let (mut sum, mut first) = (0.0, 0);
@@ -290,6 +332,20 @@ mod tests {
             }
             assert_eq!(best_interval(worth.iter().copied()), best.1);
         }
+    }
+
+    #[test]
+    fn keeping_intervals_leaves_no_loose_pieces() {
+        let mut field = VoxelGrid::filled(Vec3::zeros(), 2.0, [5, 2, 2], 1.0_f32);
+        assert_eq!(drop_loose(&mut field), None);
+        for v in 0..field.values.len() {
+            if v % 5 == 3 {
+                field.values[v] = -1.0;
+            }
+        }
+        assert_eq!(drop_loose(&mut field), Some((1, 32.0)));
+        let left = field.values.iter().filter(|f| **f > 0.0).count();
+        assert_eq!(left, 12);
     }
 
     #[test]
