@@ -27,6 +27,7 @@ mod window;
 mod tests;
 
 pub(crate) use cholesky::cholesky;
+pub(crate) use grid::cut;
 pub use islands::{Component, components};
 pub use mechanism::{RIGID_MODES, free_modes, free_modes_of};
 pub use pcg::SolveStats;

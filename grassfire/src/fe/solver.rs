@@ -167,12 +167,12 @@ impl Solver {
         forces.map(|&(at, f)| f * self.u[at]).sum()
     }
 
-    /// Adds `factor u_e' K0 u_e` of the case solved last to every voxel of `out`, for modulus 1 and edge h, `[z][y][x]`,
-    /// mm3.
-    pub fn add_energies(&self, factor: f64, out: &mut [f64]) {
+    /// Adds `factor u_e' K0 u_e` of the case solved last, for modulus 1 and edge h, mm3, to `out`, which has one number for
+    /// each of `voxels`: places in `[z][y][x]`, ascending.
+    pub fn add_energies(&self, factor: f64, voxels: &[u32], out: &mut [f64]) {
         let factor = factor * self.model.h;
         let (grid, dims) = (&self.frame.grid, self.model.dims);
-        add_energies(grid, dims, &self.stiffness, &self.u, factor, out);
+        add_energies(grid, dims, &self.stiffness, &self.u, factor, voxels, out);
     }
 
     /// Displacement of a node in the case solved last, mm; zero where there is no material.

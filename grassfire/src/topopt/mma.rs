@@ -35,19 +35,17 @@ impl Default for MmaOptions {
     }
 }
 
-/// Variables of the last two iterations and their asymptotes.
+/// The variables of the last iteration, and what the asymptotes follow from.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mma {
     /// Constants.
     pub options: MmaOptions,
-    /// Variables one and two iterations ago; empty before.
+    /// Variables one iteration ago; empty before.
     pub last: Vec<f64>,
-    /// See `last`.
-    pub before: Vec<f64>,
-    /// Lower asymptotes.
-    pub low: Vec<f64>,
-    /// Upper asymptotes.
-    pub high: Vec<f64>,
+    /// Signs of the last step, 0 where a variable stood still; empty before there was one.
+    pub steps: Vec<i8>,
+    /// Distance of both asymptotes from the variable.
+    pub reach: Vec<f64>,
 }
 
 /// The separable approximation at one variable: `p / (high - x) + q / (x - low)` of objective and constraint.
@@ -105,40 +103,40 @@ impl Mma {
                 }
             })
             .collect();
-        self.before = std::mem::replace(&mut self.last, x.to_vec());
+        self.last.clear();
+        self.last.extend_from_slice(x);
         new
     }
 
     fn move_asymptotes(&mut self, x: &[f64]) {
         let o = &self.options;
-        if self.before.len() != x.len() {
-            self.low = x.iter().map(|x| x - o.initial).collect();
-            self.high = x.iter().map(|x| x + o.initial).collect();
+        if self.last.len() != x.len() {
+            self.reach = vec![o.initial; x.len()];
             return;
         }
-        let history = self.last.par_iter().zip(&self.before);
-        let asymptotes = self.low.par_iter_mut().zip(&mut self.high);
-        x.par_iter().zip(history).zip(asymptotes).for_each(
-            |((&x, (&last, &before)), (low, high))| {
-                let turn = (x - last) * (last - before);
-                let factor = if turn < 0.0 {
-                    o.narrower
-                } else if turn > 0.0 {
-                    o.wider
-                } else {
-                    1.0
-                };
-                *low = (x - factor * (last - *low)).clamp(x - o.farthest, x - o.nearest);
-                *high = (x + factor * (*high - last)).clamp(x + o.nearest, x + o.farthest);
-            },
-        );
+        let step = |(x, last): (&f64, &f64)| (x > last) as i8 - (x < last) as i8;
+        if self.steps.len() != x.len() {
+            self.steps = x.iter().zip(&self.last).map(step).collect();
+            return;
+        }
+        let state = self.steps.par_iter_mut().zip(&mut self.reach);
+        x.par_iter().zip(&self.last).zip(state).for_each(|(pair, (before, reach))| {
+            let now = step(pair);
+            let factor = match now * *before {
+                1 => o.wider,
+                -1 => o.narrower,
+                _ => 1.0,
+            };
+            *reach = (factor * *reach).clamp(o.nearest, o.farthest);
+            *before = now;
+        });
     }
 
     fn term(&self, i: usize, x: f64, gradients: [f64; 2], step: f64) -> Term {
         if gradients == [0.0; 2] {
             return Term::default();
         }
-        let (low, high) = (self.low[i], self.high[i]);
+        let (low, high) = (x - self.reach[i], x + self.reach[i]);
         let (above, below) = ((high - x).powi(2), (x - low).powi(2));
         let p = |d: f64| above * (1.001 * d.max(0.0) + 0.001 * (-d).max(0.0) + 1e-5);
         let q = |d: f64| below * (0.001 * d.max(0.0) + 1.001 * (-d).max(0.0) + 1e-5);

@@ -130,7 +130,7 @@ pub fn optimize(
         ..
     } = run;
     drop(solver);
-    out.rho = state.rho;
+    out.rho = problem.on_grid(&state.rho, 1.0);
     out.binary = binary(problem, &chain, &out.rho, target);
     out.symmetry_error = chain.symmetry.error(problem, &out.rho).0;
     out.fallbacks = fallbacks;
@@ -197,7 +197,7 @@ struct Run<'a> {
     fallbacks: usize,
 }
 
-/// Compliances, and the strain energy of every voxel for modulus 1, weighted with the derivative of the objective.
+/// Compliances, and the strain energy of every design voxel for modulus 1, weighted with the derivative of the objective.
 struct Response {
     cases: Vec<f64>,
     compliance: f64,
@@ -221,20 +221,12 @@ impl<'a> Run<'a> {
             let start = ((target - frozen) / design).min(1.0);
             State {
                 x: vec![start; design as usize],
-                rho: vec![0.0; problem.labels.len()],
+                rho: vec![0.0; design as usize],
                 ..State::default()
             }
         });
         monitor.step(STAGE, "setting up the solver", 0.0)?;
-        let present: Vec<f64> = (0..problem.labels.len())
-            .map(|v| {
-                if problem.is_active(v) {
-                    problem.young
-                } else {
-                    0.0
-                }
-            })
-            .collect();
+        let present = problem.on_grid(&vec![problem.young; design as usize], problem.young);
         let solver = Solver::new(problem.model(), &present, solver_options)?;
         Ok(Self {
             problem,
@@ -266,7 +258,7 @@ impl<'a> Run<'a> {
         let i = self.state.iteration;
         let penalty = self.options.penalty_at(i);
         let beta = (self.options.beta > 0.0).then(|| self.options.beta_at(i));
-        let mut fields = self.chain.forward(&self.on_grid(&self.state.x), beta);
+        let mut fields = self.chain.forward(&self.state.x, beta);
         // The densities of the last iteration go before the solver takes its memory.
         let change = mean_change(&self.state.rho, &fields.rho, self.active);
         self.state.rho = std::mem::take(&mut fields.rho);
@@ -274,7 +266,8 @@ impl<'a> Run<'a> {
         let response = self.respond(stiff.as_deref(), penalty, monitor)?;
         let (df, dv) = self.gradients(&fields, stiff, penalty, response.energy);
         let rho = &self.state.rho;
-        let volume: f64 = rho.iter().sum();
+        let frozen = self.active - rho.len() as f64;
+        let volume: f64 = frozen + rho.iter().sum::<f64>();
         let grayness = 4.0 * rho.iter().map(|r| r * (1.0 - r)).sum::<f64>() / self.active;
         let last = std::mem::replace(&mut self.state.compliance[1], response.compliance);
         if i == 0 {
@@ -319,29 +312,14 @@ impl<'a> Run<'a> {
         g.par_iter_mut()
             .zip(rho)
             .for_each(|(g, &rho)| *g *= slope * rho.powf(penalty - 1.0));
-        let df = self.at_design(&self.chain.gradient(fields, &g));
-        (df, self.at_design(&self.chain.volume_gradient(fields)))
-    }
-
-    /// Values of the variables on the grid: 1 where frozen, 0 outside.
-    fn on_grid(&self, x: &[f64]) -> Vec<f64> {
-        let frozen = |&l: &u8| f64::from(u8::from(l == FROZEN));
-        let mut out: Vec<f64> = self.problem.labels.iter().map(frozen).collect();
-        for (&v, &x) in self.design.iter().zip(x) {
-            out[v as usize] = x;
-        }
-        out
-    }
-
-    /// Values of the design voxels.
-    fn at_design(&self, field: &[f64]) -> Vec<f64> {
-        self.design.iter().map(|&v| field[v as usize]).collect()
+        let df = self.chain.gradient(fields, g);
+        (df, self.chain.volume_gradient(fields))
     }
 
     /// New variables.
     fn update(&mut self, df: &[f64], dv: &[f64], volume: f64) {
         let step = self.options.limit();
-        let x = match self.options.update {
+        self.state.x = match self.options.update {
             UpdateKind::Oc => {
                 let room = self.target - volume;
                 oc::update(&self.state.x, df, dv, room, step)
@@ -354,9 +332,7 @@ impl<'a> Run<'a> {
                 self.state.mma.update(&self.state.x, &df, over, &dv, step)
             }
         };
-        let mut field = self.on_grid(&x);
-        self.chain.symmetry.copy(self.problem, &mut field);
-        self.state.x = self.at_design(&field);
+        self.chain.symmetry.copy(&mut self.state.x);
     }
 
     /// Solves all load cases for the densities `stiff`, or else those of the state.
@@ -375,7 +351,7 @@ impl<'a> Run<'a> {
         let mut out = Response {
             cases: Vec::new(),
             compliance: 0.0,
-            energy: vec![0.0; self.problem.labels.len()],
+            energy: vec![0.0; self.design.len()],
             iterations: 0,
         };
         let mut top = 0.0;
@@ -432,20 +408,14 @@ impl<'a> Run<'a> {
             factor *= (weighted / top.max(f64::MIN_POSITIVE)).powf(NORM - 1.0);
         }
         out.cases.push(compliance);
-        self.solver.add_energies(factor, &mut out.energy);
+        let solver = &self.solver;
+        solver.add_energies(factor, &self.design, &mut out.energy);
     }
 
     fn moduli(&self, rho: &[f64], penalty: f64, e_min: f64) -> Vec<f64> {
-        rho.par_iter()
-            .enumerate()
-            .map(|(v, &rho)| {
-                if self.problem.is_active(v) {
-                    self.problem.young * (e_min + rho.powf(penalty) * (1.0 - e_min))
-                } else {
-                    0.0
-                }
-            })
-            .collect()
+        let modulus = |rho: f64| self.problem.young * (e_min + rho.powf(penalty) * (1.0 - e_min));
+        let design: Vec<f64> = rho.par_iter().map(|&rho| modulus(rho)).collect();
+        self.problem.on_grid(&design, modulus(1.0))
     }
 }
 

@@ -15,7 +15,7 @@ pub struct State {
     pub iteration: usize,
     /// Variables, one a design voxel.
     pub x: Vec<f64>,
-    /// Densities of the last iteration.
+    /// Densities of the last iteration, one a design voxel.
     pub rho: Vec<f64>,
     /// Compliance of the first and of the last iteration.
     pub compliance: [f64; 2],
@@ -45,20 +45,14 @@ impl State {
         problem: &Problem,
         options: &OptimizeOptions,
     ) -> Result<(), IoError> {
-        let fields = [
-            &self.x,
-            &self.rho,
-            &self.mma.last,
-            &self.mma.before,
-            &self.mma.low,
-            &self.mma.high,
-        ];
+        let fields = [&self.x, &self.rho, &self.mma.last, &self.mma.reach];
+        let steps: Vec<u8> = self.mma.steps.iter().map(|s| s.to_le_bytes()[0]).collect();
         let header = Header {
             problem: fingerprint(problem, options),
             iteration: self.iteration,
             compliance: self.compliance,
             quiet: self.quiet,
-            lengths: fields.iter().map(|f| f.len()).collect(),
+            lengths: fields.iter().map(|f| f.len()).chain([steps.len()]).collect(),
         };
         atomic_write(path, |out| {
             serde_json::to_writer(&mut *out, &header)?;
@@ -66,7 +60,7 @@ impl State {
             for value in fields.into_iter().flatten() {
                 out.write_all(&value.to_le_bytes())?;
             }
-            Ok(())
+            out.write_all(&steps)
         })
     }
 
@@ -93,41 +87,35 @@ impl State {
         if header.problem != fingerprint(problem, options) {
             return Err(bad("its voxels, loads or options differ"));
         }
-        let (n, all) = (problem.design().count(), problem.labels.len());
+        let n = problem.design().count();
         let data = &bytes[end + 1..];
-        let fits = header.lengths.len() == 6
-            && header.lengths[..2] == [n, all]
-            && header.lengths[2..].iter().all(|&l| l == 0 || l == n)
-            && data.len() == 8 * header.lengths.iter().sum::<usize>();
-        if !fits {
+        let &[x, rho, last, reach, steps] = &header.lengths[..] else {
+            return Err(bad("it is damaged"));
+        };
+        let fits = [x, rho] == [n, n] && [last, reach, steps].iter().all(|&l| l == 0 || l == n);
+        if !fits || data.len() != 8 * (x + rho + last + reach) + steps {
             return Err(bad("it is damaged"));
         }
-        let mut numbers = data.chunks_exact(8).map(|c| {
+        let (numbers, signs) = data.split_at(data.len() - steps);
+        let mut numbers = numbers.chunks_exact(8).map(|c| {
             let mut b = [0; 8];
             b.copy_from_slice(c);
             f64::from_le_bytes(b)
         });
-        let mut field = |i: usize| {
-            numbers
-                .by_ref()
-                .take(header.lengths[i])
-                .collect::<Vec<f64>>()
-        };
-        let state = Self {
+        let mut field = |length: usize| numbers.by_ref().take(length).collect::<Vec<f64>>();
+        Ok(Self {
             iteration: header.iteration,
             compliance: header.compliance,
             quiet: header.quiet,
-            x: field(0),
-            rho: field(1),
+            x: field(x),
+            rho: field(rho),
             mma: Mma {
-                last: field(2),
-                before: field(3),
-                low: field(4),
-                high: field(5),
+                last: field(last),
+                reach: field(reach),
+                steps: signs.iter().map(|&s| i8::from_le_bytes([s])).collect(),
                 ..Mma::default()
             },
-        };
-        Ok(state)
+        })
     }
 }
 
