@@ -61,7 +61,7 @@ impl Solver {
     /// taken.
     ///
     /// 1. The grid is padded so that it can be halved until the coarsest one has at most `options.coarsest` unknowns.
-    /// 2. Galerkin tables of every level are computed; the moduli are set as by [`Solver::set_moduli`].
+    /// 2. Galerkin tables of every level are computed, then the coarse operators as by [`Solver::set_moduli`].
     ///
     /// # Errors
     /// [`FeError::Memory`] before anything large is allocated; [`FeError::Empty`], [`FeError::LoadOnVoid`],
@@ -99,16 +99,29 @@ impl Solver {
             stiffness,
             options: options.clone(),
         };
-        out.set_moduli(moduli)?;
+        spread(&out.frame.grid, &out.model, moduli, &mut out.e);
+        out.set_multigrid()?;
         Ok(out)
     }
 
-    /// Takes new moduli, MPa; the last displacements stay as the start of the next solution.
+    /// Takes new moduli, MPa, of `voxels`: places in `[z][y][x]`, ascending; those without a modulus at first stay without.
+    /// The last displacements stay as the start of the next solution.
     ///
     /// # Errors
     /// [`FeError::Factor`].
-    pub fn set_moduli(&mut self, moduli: &[f64]) -> Result<(), FeError> {
-        spread(&self.frame.grid, &self.model, moduli, &mut self.e);
+    pub fn set_moduli(&mut self, voxels: &[u32], moduli: &[f64]) -> Result<(), FeError> {
+        let ([nx, ny, _], grid) = (self.model.dims, &self.frame.grid);
+        for (&v, &modulus) in voxels.iter().zip(moduli) {
+            let v = v as usize;
+            let at = [v % nx, v / nx % ny, v / (nx * ny)];
+            if let Some(place) = grid.place(at) {
+                self.e[grid.first(at[2]) + place] = modulus * self.model.h;
+            }
+        }
+        self.set_multigrid()
+    }
+
+    fn set_multigrid(&mut self) -> Result<(), FeError> {
         self.multigrid.set(Fine {
             frame: &self.frame,
             e: &self.e,

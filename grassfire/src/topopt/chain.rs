@@ -1,6 +1,6 @@
 //! From the variables to the densities, and back for gradients.
 
-use super::options::{OptimizeOptions, Parting};
+use super::options::OptimizeOptions;
 use super::problem::{FROZEN, OUTSIDE};
 use super::projection::Projection;
 use super::symmetry::Symmetry;
@@ -25,18 +25,7 @@ pub struct Fields {
     filtered: Vec<f64>,
     /// After the hull.
     hulled: Vec<f64>,
-    /// Densities.
-    pub rho: Vec<f64>,
-    /// The thinner structure whose stiffness counts, with the robust formulation.
-    pub eroded: Option<Vec<f64>>,
     projection: Option<Projection>,
-}
-
-impl Fields {
-    /// The densities whose stiffness counts.
-    pub fn stiff(&self) -> &[f64] {
-        self.eroded.as_deref().unwrap_or(&self.rho)
-    }
 }
 
 impl<'a> Chain<'a> {
@@ -51,7 +40,7 @@ impl<'a> Chain<'a> {
         let chain = Self {
             problem,
             filter,
-            hull: hull(problem, options)?,
+            hull: Hull::of(problem, options)?,
             symmetry,
             erosion: options.robust,
         };
@@ -87,31 +76,36 @@ impl<'a> Chain<'a> {
         })
     }
 
-    /// Densities for the variables `x`, one a design voxel; without `beta` nothing is projected.
-    pub fn forward(&self, x: &[f64], beta: Option<f64>) -> Fields {
+    /// Filters the variables `x`, one a design voxel; without `beta` nothing will be projected.
+    pub fn forward(&self, x: &[f64], beta: Option<f64>, fields: &mut Fields) {
         let filtered = self.filter.forward(self.problem, x);
-        let (filtered, hulled) = match &self.hull {
+        match &self.hull {
             Some(hull) => {
                 let hulled = hull.smooth(&self.problem.on_grid(&filtered, 1.0));
-                (filtered, self.problem.at_design(&hulled))
+                fields.hulled.clone_from(&self.problem.at_design(&hulled));
+                fields.filtered.clone_from(&filtered);
             }
-            None => (Vec::new(), filtered),
-        };
-        let projection = beta.map(|beta| Projection::keeping_volume(beta, &hulled));
-        let densities = |projection: Option<Projection>| -> Vec<f64> {
-            let value = |&m: &f64| projection.map_or(m, |p| p.value(m)).clamp(0.0, 1.0);
-            let mut rho: Vec<f64> = hulled.iter().map(value).collect();
-            self.symmetry.copy(&mut rho);
-            rho
-        };
-        let eroded = projection.filter(|_| self.erosion > 0.0);
-        Fields {
-            rho: densities(projection),
-            eroded: eroded.map(|p| densities(Some(p.shifted(self.erosion)))),
-            filtered,
-            hulled,
-            projection,
+            None => fields.hulled.clone_from(&filtered),
         }
+        fields.projection = beta.map(|beta| Projection::keeping_volume(beta, &fields.hulled));
+    }
+
+    /// The densities.
+    pub fn densities(&self, fields: &Fields) -> Vec<f64> {
+        self.projected(fields, fields.projection)
+    }
+
+    /// The densities of the thinner structure whose stiffness counts with the robust formulation.
+    pub fn eroded(&self, fields: &Fields) -> Option<Vec<f64>> {
+        let projection = fields.projection.filter(|_| self.erosion > 0.0)?;
+        Some(self.projected(fields, Some(projection.shifted(self.erosion))))
+    }
+
+    fn projected(&self, fields: &Fields, projection: Option<Projection>) -> Vec<f64> {
+        let value = |&m: &f64| projection.map_or(m, |p| p.value(m)).clamp(0.0, 1.0);
+        let mut rho: Vec<f64> = fields.hulled.iter().map(value).collect();
+        self.symmetry.copy(&mut rho);
+        rho
     }
 
     /// Gradient by the variables of a function with gradient `g` by the densities whose stiffness counts. The threshold of
@@ -154,37 +148,4 @@ impl<'a> Chain<'a> {
         self.symmetry.average(&mut g);
         g
     }
-}
-
-/// The hull that the options ask for.
-fn hull(problem: &Problem, options: &OptimizeOptions) -> Result<Option<Hull>, TopoptError> {
-    let Some(draw) = &options.draw else {
-        return Ok(None);
-    };
-    let dir = draw.dir;
-    let size = dir.iter().map(|d| d * d).sum::<f64>().sqrt();
-    let axis = (0..3).find(|&a| size > 0.0 && dir[a].abs() >= (1.0 - 1e-9) * size);
-    let Some(axis) = axis else {
-        return Err(TopoptError::DrawDirection { dir });
-    };
-    let layers = (draw.at - problem.origin[axis]) / problem.h;
-    let layer = layers.round();
-    if draw.parting == Parting::Plane
-        && ((layers - layer).abs() > 1e-6 || layer < 0.0 || layer > problem.dims[axis] as f64)
-    {
-        return Err(TopoptError::Plane {
-            what: "the parting plane",
-            at: draw.at,
-            h: problem.h,
-            nearest: problem.origin[axis] + problem.h * layer.clamp(0.0, problem.dims[axis] as f64),
-        });
-    }
-    let layer = layer.max(0.0) as usize;
-    Ok(Some(Hull::new(
-        problem.dims,
-        axis,
-        dir[axis] > 0.0,
-        draw.parting,
-        layer,
-    )))
 }

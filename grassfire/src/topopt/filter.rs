@@ -41,9 +41,7 @@ impl Filter {
                     .for_each(|(v, s)| *v *= s);
                 out
             }
-            Self::Helmholtz(filter) => {
-                problem.at_design(&filter.solve(&problem.on_grid(x, 1.0)))
-            }
+            Self::Helmholtz(filter) => problem.at_design(&filter.solve(&problem.on_grid(x, 1.0))),
         }
     }
 
@@ -57,9 +55,7 @@ impl Filter {
                 cone.weigh(&problem.labels, &g, 0.0)
             }
             // The operator is symmetric.
-            Self::Helmholtz(filter) => {
-                problem.at_design(&filter.solve(&problem.on_grid(&g, 0.0)))
-            }
+            Self::Helmholtz(filter) => problem.at_design(&filter.solve(&problem.on_grid(&g, 0.0))),
         }
     }
 }

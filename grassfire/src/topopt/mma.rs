@@ -35,17 +35,15 @@ impl Default for MmaOptions {
     }
 }
 
-/// The variables of the last iteration, and what the asymptotes follow from.
+/// What the asymptotes follow from; empty at first.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mma {
     /// Constants.
     pub options: MmaOptions,
-    /// Variables one iteration ago; empty before.
-    pub last: Vec<f64>,
-    /// Signs of the last step, 0 where a variable stood still; empty before there was one.
+    /// Signs of the last step, 0 where a variable stood still.
     pub steps: Vec<i8>,
     /// Distance of both asymptotes from the variable.
-    pub reach: Vec<f64>,
+    pub reach: Vec<f32>,
 }
 
 /// The separable approximation at one variable: `p / (high - x) + q / (x - low)` of objective and constraint.
@@ -67,8 +65,8 @@ impl Mma {
     ///
     /// Variables whose gradients `df` and `dg` are both 0 stay. K. Svanberg: The method of moving asymptotes, 1987,
     /// doi:10.1002/nme.1620240207.
-    pub fn update(&mut self, x: &[f64], df: &[f64], g: f64, dg: &[f64], step: f64) -> Vec<f64> {
-        self.move_asymptotes(x);
+    pub fn update(&mut self, x: &mut [f64], df: &[f64], g: f64, dg: &[f64], step: f64) {
+        self.start(x.len());
         // Terms are made again for every multiplier: storing them would take more memory than all else here.
         let sum = |of: &(dyn Fn(&Term, f64) -> f64 + Sync)| -> f64 {
             let parts: Vec<f64> = (0..x.len().div_ceil(CHUNK))
@@ -103,31 +101,31 @@ impl Mma {
                 }
             })
             .collect();
-        self.last.clear();
-        self.last.extend_from_slice(x);
-        new
+        self.move_asymptotes(x, &new);
+        x.copy_from_slice(&new);
     }
 
-    fn move_asymptotes(&mut self, x: &[f64]) {
+    /// Takes the memory for `n` variables; a new start when there were others.
+    pub fn start(&mut self, n: usize) {
+        if self.reach.len() != n {
+            self.steps = vec![0; n];
+            self.reach = vec![self.options.initial as f32; n];
+        }
+    }
+
+    /// Nearer after an oscillation, farther after two steps the same way.
+    fn move_asymptotes(&mut self, x: &[f64], new: &[f64]) {
         let o = &self.options;
-        if self.last.len() != x.len() {
-            self.reach = vec![o.initial; x.len()];
-            return;
-        }
-        let step = |(x, last): (&f64, &f64)| (x > last) as i8 - (x < last) as i8;
-        if self.steps.len() != x.len() {
-            self.steps = x.iter().zip(&self.last).map(step).collect();
-            return;
-        }
         let state = self.steps.par_iter_mut().zip(&mut self.reach);
-        x.par_iter().zip(&self.last).zip(state).for_each(|(pair, (before, reach))| {
-            let now = step(pair);
+        let steps = x.par_iter().zip(new);
+        steps.zip(state).for_each(|((x, new), (before, reach))| {
+            let now = (new > x) as i8 - (new < x) as i8;
             let factor = match now * *before {
                 1 => o.wider,
                 -1 => o.narrower,
                 _ => 1.0,
             };
-            *reach = (factor * *reach).clamp(o.nearest, o.farthest);
+            *reach = (factor * f64::from(*reach)).clamp(o.nearest, o.farthest) as f32;
             *before = now;
         });
     }
@@ -136,7 +134,8 @@ impl Mma {
         if gradients == [0.0; 2] {
             return Term::default();
         }
-        let (low, high) = (x - self.reach[i], x + self.reach[i]);
+        let reach = f64::from(self.reach[i]);
+        let (low, high) = (x - reach, x + reach);
         let (above, below) = ((high - x).powi(2), (x - low).powi(2));
         let p = |d: f64| above * (1.001 * d.max(0.0) + 0.001 * (-d).max(0.0) + 1e-5);
         let q = |d: f64| below * (0.001 * d.max(0.0) + 1.001 * (-d).max(0.0) + 1e-5);

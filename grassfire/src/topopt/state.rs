@@ -45,22 +45,27 @@ impl State {
         problem: &Problem,
         options: &OptimizeOptions,
     ) -> Result<(), IoError> {
-        let fields = [&self.x, &self.rho, &self.mma.last, &self.mma.reach];
-        let steps: Vec<u8> = self.mma.steps.iter().map(|s| s.to_le_bytes()[0]).collect();
+        let (steps, reach) = (&self.mma.steps, &self.mma.reach);
         let header = Header {
             problem: fingerprint(problem, options),
             iteration: self.iteration,
             compliance: self.compliance,
             quiet: self.quiet,
-            lengths: fields.iter().map(|f| f.len()).chain([steps.len()]).collect(),
+            lengths: vec![self.x.len(), self.rho.len(), reach.len(), steps.len()],
         };
         atomic_write(path, |out| {
             serde_json::to_writer(&mut *out, &header)?;
             out.write_all(b"\n")?;
-            for value in fields.into_iter().flatten() {
+            for value in self.x.iter().chain(&self.rho) {
                 out.write_all(&value.to_le_bytes())?;
             }
-            out.write_all(&steps)
+            for value in reach {
+                out.write_all(&value.to_le_bytes())?;
+            }
+            for value in steps {
+                out.write_all(&value.to_le_bytes())?;
+            }
+            Ok(())
         })
     }
 
@@ -89,30 +94,33 @@ impl State {
         }
         let n = problem.design().count();
         let data = &bytes[end + 1..];
-        let &[x, rho, last, reach, steps] = &header.lengths[..] else {
-            return Err(bad("it is damaged"));
-        };
-        let fits = [x, rho] == [n, n] && [last, reach, steps].iter().all(|&l| l == 0 || l == n);
-        if !fits || data.len() != 8 * (x + rho + last + reach) + steps {
+        let fits = matches!(header.lengths[..], [x, rho, reach, steps]
+            if [x, rho] == [n, n] && reach == steps && (reach == 0 || reach == n));
+        let reach = header.lengths.get(2).copied().unwrap_or(0);
+        if !fits || data.len() != 16 * n + 5 * reach {
             return Err(bad("it is damaged"));
         }
-        let (numbers, signs) = data.split_at(data.len() - steps);
-        let mut numbers = numbers.chunks_exact(8).map(|c| {
-            let mut b = [0; 8];
-            b.copy_from_slice(c);
-            f64::from_le_bytes(b)
-        });
-        let mut field = |length: usize| numbers.by_ref().take(length).collect::<Vec<f64>>();
+        let (variables, asymptotes) = data.split_at(16 * n);
+        let (reach, steps) = asymptotes.split_at(4 * reach);
+        let mut variables = variables
+            .as_chunks()
+            .0
+            .iter()
+            .map(|&b| f64::from_le_bytes(b));
         Ok(Self {
             iteration: header.iteration,
             compliance: header.compliance,
             quiet: header.quiet,
-            x: field(x),
-            rho: field(rho),
+            x: variables.by_ref().take(n).collect(),
+            rho: variables.collect(),
             mma: Mma {
-                last: field(last),
-                reach: field(reach),
-                steps: signs.iter().map(|&s| i8::from_le_bytes([s])).collect(),
+                steps: steps.iter().map(|&s| i8::from_le_bytes([s])).collect(),
+                reach: reach
+                    .as_chunks()
+                    .0
+                    .iter()
+                    .map(|&b| f32::from_le_bytes(b))
+                    .collect(),
                 ..Mma::default()
             },
         })

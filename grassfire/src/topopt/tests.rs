@@ -103,12 +103,14 @@ fn evaluate(
     solver: &mut Solver,
 ) -> (f64, Vec<f64>, f64, Vec<f64>) {
     let monitor = Monitor::default();
-    let fields = chain.forward(x, Some(4.0));
+    let mut fields = Fields::default();
+    chain.forward(x, Some(4.0), &mut fields);
+    let (rho, eroded) = (chain.densities(&fields), chain.eroded(&fields));
     let e = |rho: f64| 1e-6 + rho.powi(3) * (1.0 - 1e-6);
-    let stiff = fields.stiff();
+    let stiff = eroded.as_ref().unwrap_or(&rho);
     let moduli: Vec<f64> = stiff.iter().map(|&rho| e(rho)).collect();
-    solver.set_moduli(&problem.on_grid(&moduli, e(1.0))).unwrap();
     let design: Vec<u32> = problem.design().map(|v| v as u32).collect();
+    solver.set_moduli(&design, &moduli).unwrap();
     let mut g = vec![0.0; x.len()];
     let mut c = 0.0;
     for (k, case) in problem.cases.iter().enumerate() {
@@ -120,7 +122,7 @@ fn evaluate(
             g[i] -= case.weight * 3.0 * stiff[i].powi(2) * (1.0 - 1e-6) * energy;
         }
     }
-    let volume = fields.rho.iter().sum();
+    let volume = rho.iter().sum();
     (
         c,
         chain.gradient(&fields, g),
