@@ -1,5 +1,7 @@
 //! The solver of one voxel model: set the moduli, solve the load cases.
 
+use rayon::prelude::*;
+
 use super::energy::add_energies;
 use super::frame::Frame;
 use super::grid::NodeGrid;
@@ -31,8 +33,8 @@ const MAX_LEVELS: usize = 7;
 pub fn memory_estimate(voxels: f64, cases: usize) -> f64 {
     // A node more than voxels each way, and short rows: a tenth more nodes.
     let nodes = 1.1 * voxels + 1e4;
-    // Single: b, x, d, t, the diagonal, u of every case. Double: r, p, q, u, moduli.
-    let starts = if cases > 1 { 3.0 * cases as f64 } else { 0.0 };
+    // Single: b, x, d, t, the diagonal, u of every case but one. Double: r, p, q, u, moduli.
+    let starts = 3.0 * cases.saturating_sub(1) as f64;
     let fine = 4.0 * (4.0 * 3.0 + 1.0 + starts) + 8.0 * (4.0 * 3.0 + 1.0);
     // Coarse levels: 1/7 of stencil and fields, a quarter more nodes at their borders.
     nodes * fine + voxels * 1.25 * (243.0 + 18.0) * 4.0 / 7.0
@@ -49,8 +51,10 @@ pub struct Solver {
     right: Vec<Vec<(usize, f64)>>,
     /// Displacements of the case solved last.
     u: Vec<f64>,
-    /// With several cases, what each starts from: rounded, which is far below the tolerance.
+    /// Displacements of the other cases, which start from them: rounded, which is far below the tolerance.
     starts: Vec<Vec<f32>>,
+    /// Where those of every case lie in `starts`; none for the case solved last.
+    places: Vec<Option<usize>>,
     last: usize,
     stiffness: [[f64; 24]; 24],
     options: SolverOptions,
@@ -87,11 +91,8 @@ impl Solver {
             operator: MatrixFree::new(&stiffness),
             e: frame.grid.scalar(),
             u: frame.grid.field(),
-            starts: if cases > 1 {
-                vec![frame.grid.field(); cases]
-            } else {
-                Vec::new()
-            },
+            starts: vec![frame.grid.field(); cases.saturating_sub(1)],
+            places: (0..cases).map(|case| case.checked_sub(1)).collect(),
             last: 0,
             right,
             model,
@@ -133,11 +134,13 @@ impl Solver {
     /// # Errors
     /// [`FeError::NotConverged`]; the displacements are what was reached. [`FeError::Cancelled`].
     pub fn solve(&mut self, case: usize, monitor: &Monitor) -> Result<SolveStats, FeError> {
-        self.last = case;
-        if let Some(start) = self.starts.get(case) {
-            for (u, &start) in self.u.iter_mut().zip(start) {
-                *u = f64::from(start);
-            }
+        if let Some(place) = self.places[case].take() {
+            let start = self.starts[place].par_iter_mut();
+            start.zip(&mut self.u).for_each(|(start, u)| {
+                (*start, *u) = (*u as f32, f64::from(*start));
+            });
+            self.places[self.last] = Some(place);
+            self.last = case;
         }
         let limits = (self.options.tolerance, self.options.max_iterations);
         let stats = pcg::solve(
@@ -152,11 +155,6 @@ impl Solver {
             limits,
             monitor,
         )?;
-        if let Some(start) = self.starts.get_mut(case) {
-            for (start, &u) in start.iter_mut().zip(&self.u) {
-                *start = u as f32;
-            }
-        }
         if stats.converged {
             return Ok(stats);
         }
