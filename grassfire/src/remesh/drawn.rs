@@ -32,7 +32,7 @@ pub struct Draw {
 ///
 /// Lines through a column that does not fall away from the parting plane (non-design bodies with cross bores, and where the
 /// design space does not reach the plane) may cross more often. Border and margins are as in [`super::iso_surface`].
-/// W. E. Lorensen, H. E. Cline: Marching cubes, 1987, doi:10.1145/37401.37422.
+/// W. E. Lorensen, H. E. Cline: Marching cubes, 1987, doi:10.1145/37402.37422.
 ///
 /// # Errors
 /// As [`super::remesh_density`].
