@@ -8,7 +8,7 @@ use super::grid::NodeGrid;
 use super::matrix_free::MatrixFree;
 use super::multigrid::{Fine, Multigrid};
 use super::pcg::{self, SolveStats};
-use super::{FeError, SolverOptions, element};
+use super::{FeError, SolverOptions, element, galerkin};
 use crate::monitor::Monitor;
 
 /// Geometry, supports and loads of a voxel model.
@@ -28,6 +28,10 @@ pub struct VoxelModel {
 
 /// Most levels of a hierarchy.
 const MAX_LEVELS: usize = 7;
+/// Unknowns that are always few enough for a direct solution, and their share of those of the finest grid that is: the
+/// factor must not cost more than the iterations that it spares.
+const FEW: usize = 5000;
+const SHARE: usize = 80;
 
 /// Bytes that a solver takes, about: `voxels` that may have stiffness.
 pub fn memory_estimate(voxels: f64, cases: usize) -> f64 {
@@ -76,7 +80,7 @@ impl Solver {
         options: &SolverOptions,
     ) -> Result<Self, FeError> {
         check(&model, moduli, options)?;
-        let count = levels(model.dims, options.coarsest);
+        let count = levels(model.dims, moduli, options.coarsest);
         let side = 1usize << (count - 1);
         let occupied = padded(model.dims, side, moduli);
         let grid = NodeGrid::new(model.dims.map(|n| n.next_multiple_of(side)), &occupied);
@@ -210,6 +214,24 @@ impl Solver {
         sum
     }
 
+    /// Multiplies by the stiffness `rounds` times, in single precision like the multigrid or in double: for benchmarks.
+    #[doc(hidden)]
+    pub fn multiply(&self, single: bool, rounds: usize) {
+        let grid = &self.frame.grid;
+        if single {
+            let operator = MatrixFree::<f32>::new(&self.stiffness);
+            let (u, mut product) = (vec![1f32; 3 * grid.len()], grid.field());
+            for _ in 0..rounds {
+                operator.apply(grid, &self.e, &[], &u, &mut product);
+            }
+        } else {
+            let (u, mut product) = (vec![1f64; 3 * grid.len()], grid.field());
+            for _ in 0..rounds {
+                self.operator.apply(grid, &self.e, &[], &u, &mut product);
+            }
+        }
+    }
+
     /// Nodes in memory: those of voxels that may have stiffness, and some in short gaps between them.
     pub fn stored_nodes(&self) -> usize {
         self.frame.grid.len()
@@ -259,29 +281,37 @@ fn check(model: &VoxelModel, moduli: &[f64], options: &SolverOptions) -> Result<
     Ok(())
 }
 
-/// Levels until the coarsest grid has at most `coarsest` unknowns.
-fn levels(dims: [usize; 3], coarsest: usize) -> usize {
-    let unknowns = |level: usize| {
-        3 * dims
-            .iter()
-            .map(|&n| n.div_ceil(1 << level) + 1)
-            .product::<usize>()
-    };
-    (0..MAX_LEVELS)
-        .find(|&l| unknowns(l) <= coarsest)
-        .unwrap_or(MAX_LEVELS - 1)
-        + 1
+/// Levels until the coarsest grid has at most `coarsest` unknowns and is small beside the finest one.
+fn levels(dims: [usize; 3], moduli: &[f64], coarsest: usize) -> usize {
+    let (mut n, mut occupied) = (dims, padded(dims, 1, moduli));
+    let mut limit = 0;
+    for level in 1..MAX_LEVELS {
+        let unknowns = 3 * NodeGrid::new(n, &occupied).len();
+        if level == 1 {
+            limit = coarsest.min(FEW.max(unknowns / SHARE));
+        }
+        if unknowns <= limit {
+            return level;
+        }
+        let even = n.map(|n| n.next_multiple_of(2));
+        occupied = galerkin::coarsen(even, &widened(n, even, &occupied));
+        n = even.map(|n| n / 2);
+    }
+    MAX_LEVELS
 }
 
 /// Which elements may have stiffness, on the grid whose sides are multiples of `side`.
-fn padded([nx, ny, nz]: [usize; 3], side: usize, moduli: &[f64]) -> Vec<bool> {
-    let n = [nx, ny, nz].map(|n| n.next_multiple_of(side));
-    let mut out = vec![false; n.iter().product()];
-    for (row, moduli) in moduli.chunks_exact(nx).enumerate() {
-        let to = (row / ny * n[1] + row % ny) * n[0];
-        for (to, &e) in out[to..].iter_mut().zip(moduli) {
-            *to = e > 0.0;
-        }
+fn padded(n: [usize; 3], side: usize, moduli: &[f64]) -> Vec<bool> {
+    let occupied: Vec<bool> = moduli.iter().map(|&e| e > 0.0).collect();
+    widened(n, n.map(|n| n.next_multiple_of(side)), &occupied)
+}
+
+/// The same elements on a larger grid.
+fn widened(from: [usize; 3], to: [usize; 3], occupied: &[bool]) -> Vec<bool> {
+    let mut out = vec![false; to.iter().product()];
+    for (row, occupied) in occupied.chunks_exact(from[0]).enumerate() {
+        let at = (row / from[1] * to[1] + row % from[1]) * to[0];
+        out[at..at + from[0]].copy_from_slice(occupied);
     }
     out
 }
