@@ -63,18 +63,29 @@ fn products() {
         loads: vec![vec![([n, n, n], [1.0, 0.0, 0.0])]],
     };
     let voxels = n * n * n;
-    let solver = Solver::new(model, &vec![1.0; voxels], &SolverOptions::default()).expect("a solver");
-    println!("{n}^3 voxels: wall s, CPU s, million voxels (triad: gigabytes) a wall and a CPU second");
+    let solver =
+        Solver::new(model, &vec![1.0; voxels], &SolverOptions::default()).expect("a solver");
+    println!(
+        "{n}^3 voxels: wall s, CPU s, million voxels (triad: gigabytes) a wall and a CPU second"
+    );
     let rounds = 60;
     for threads in [1, 2] {
         let (seconds, bytes) = triad(threads, rounds);
         let row = |name: &str, [wall, cpu]: [f64; 2], amount: f64| {
-            println!("{name}, {threads} threads: {wall:.2} {cpu:.2} {:.1} {:.1}", amount / wall, amount / cpu);
+            println!(
+                "{name}, {threads} threads: {wall:.2} {cpu:.2} {:.1} {:.1}",
+                amount / wall,
+                amount / cpu
+            );
         };
         row("triad", seconds, bytes);
         for single in [true, false] {
             let seconds = timed(threads, || solver.multiply(single, rounds));
-            let name = if single { "product, single" } else { "product, double" };
+            let name = if single {
+                "product, single"
+            } else {
+                "product, double"
+            };
             row(name, seconds, 1e-6 * (voxels * rounds) as f64);
         }
     }
@@ -84,24 +95,41 @@ fn products() {
 fn cold(sizes: &[usize]) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/cantilever/case.toml");
     let monitor = Monitor::default();
-    println!("cantilever: voxels along x, empty modulus, iterations, CPU s of the set-up and of the solution");
+    println!(
+        "cantilever: voxels along x, empty modulus, iterations, CPU s of the set-up and of the solution"
+    );
     for &n in sizes {
         let mut case = Case::read(&path).expect("the example");
         case.grid.h = 48.0 / n as f64;
         case.optimize.filter_radius = Some(3f64.sqrt() * case.grid.h);
         case.optimize.max_iterations = 40;
-        let problem = case::build(&case, Path::new(""), &monitor).expect("a problem").problem;
+        let problem = case::build(&case, Path::new(""), &monitor)
+            .expect("a problem")
+            .problem;
         let none = |_: &_| Ok(());
-        let done = optimize(&problem, &case.optimize, &case.solver, None, &none, &monitor);
+        let done = optimize(
+            &problem,
+            &case.optimize,
+            &case.solver,
+            None,
+            &none,
+            &monitor,
+        );
         let rho = done.expect("a design").rho;
         for e_min in [1e-6, 1e-9] {
-            let moduli: Vec<f64> = rho.iter().map(|r| e_min + r.powi(3) * (1.0 - e_min)).collect();
+            let moduli: Vec<f64> = rho
+                .iter()
+                .map(|r| e_min + r.powi(3) * (1.0 - e_min))
+                .collect();
             let start = processor();
             let mut solver = Solver::new(problem.model(), &moduli, &case.solver).expect("a solver");
             let ready = processor();
             let stats = solver.solve(0, &monitor).expect("a solution");
             let [setup, solve] = [ready - start, processor() - ready];
-            println!("{n}, {e_min:.0e}: {} {setup:.2} {solve:.2}", stats.iterations);
+            println!(
+                "{n}, {e_min:.0e}: {} {setup:.2} {solve:.2}",
+                stats.iterations
+            );
         }
     }
 }

@@ -225,9 +225,10 @@ mod tests {
         let mut through = 0;
         for i in 0..61 {
             for j in 0..61 {
-                let place =
-                    |a: usize, i: usize| low[a] + (high[a] - low[a]) * (i as f64 + 0.537) / 61.0;
-                let found = crossings(mesh, axis, [place(u, i), place(v, j)]);
+                // Different shifts: on the diagonals of cells lie edges of triangles.
+                let place = |a: usize, i: f64| low[a] + (high[a] - low[a]) * i / 61.0;
+                let p = [place(u, i as f64 + 0.537), place(v, j as f64 + 0.291)];
+                let found = crossings(mesh, axis, p);
                 assert!(found.is_empty() || found.len() == 2, "{i} {j}: {found:?}");
                 through += found.len() / 2;
             }
