@@ -3,42 +3,49 @@
 use pulp::Arch;
 use rayon::prelude::*;
 
-use super::grid::{BLOCK, NodeGrid};
+use super::grid::{BLOCK, NodeGrid, cut};
 use super::window::Window;
 
 /// Elements that are worked on together.
 const LANES: usize = 8;
 
-/// Adds `factor u_e' K0 u_e` for the unit stiffness to `out`, `[z][y][x]` over `dims`; nothing where no node is stored.
+/// Adds `factor u_e' K0 u_e` for the unit stiffness to `out`, which has one number for each of `voxels`: their places in
+/// `[z][y][x]` over `dims`, ascending. Nothing is added where no node is stored.
 pub(super) fn add_energies(
     grid: &NodeGrid,
-    [nx, ny, _]: [usize; 3],
+    [nx, ny, nz]: [usize; 3],
     k: &[[f64; 24]; 24],
     u: &[f64],
     factor: f64,
+    voxels: &[u32],
     out: &mut [f64],
 ) {
-    let planes = out.par_chunks_mut(nx * ny).enumerate();
-    planes.for_each_init(
-        || Window::new(grid, 3),
-        |near, (z, out)| {
+    let before = |row: usize| voxels.partition_point(|&v| (v as usize) < row * nx);
+    let planes: Vec<usize> = (0..=nz).map(|z| before(z * ny)).collect();
+    let parts = cut(out, &planes).into_par_iter().enumerate();
+    parts.for_each_init(
+        || (Window::new(grid, 3), vec![0.0; nx]),
+        |(near, energies), (z, out)| {
             near.clear();
+            let voxels = &voxels[planes[z]..planes[z + 1]];
             Arch::new().dispatch(|| {
-                for y in 0..ny {
-                    let runs = grid.row(y, z);
-                    if runs.is_empty() {
-                        continue;
-                    }
+                let rows = voxels.chunk_by(|&a, &b| a as usize / nx == b as usize / nx);
+                let mut to = out.iter_mut();
+                for row in rows {
+                    let y = row[0] as usize / nx % ny;
                     near.load(grid, u, |v| v, y, z);
-                    for run in runs {
-                        let row = &mut out[y * nx..(y + 1) * nx];
+                    energies.fill(0.0);
+                    for run in grid.row(y, z) {
                         let end = (run.x + run.len).min(nx);
                         for x in (run.x..end).step_by(LANES) {
-                            let energies = block(near, k, x, y);
-                            for (to, e) in row[x..end].iter_mut().zip(energies) {
-                                *to += factor * e;
+                            let block = block(near, k, x, y);
+                            for (to, e) in energies[x..end].iter_mut().zip(block) {
+                                *to = e;
                             }
                         }
+                    }
+                    for (&v, to) in row.iter().zip(&mut to) {
+                        *to += factor * energies[v as usize % nx];
                     }
                 }
             });

@@ -141,16 +141,21 @@ impl NodeGrid {
         components: usize,
         field: &'a mut [T],
     ) -> impl IndexedParallelIterator<Item = &'a mut [T]> {
-        let mut rest = field;
-        let mut out = Vec::with_capacity(self.n[2] + 1);
-        for z in 0..=self.n[2] {
-            let (plane, others) =
-                std::mem::take(&mut rest).split_at_mut(components * self.count(z));
-            out.push(plane);
-            rest = others;
-        }
-        out.into_par_iter()
+        let ends: Vec<usize> = self.planes.iter().map(|at| components * at).collect();
+        cut(field, &ends).into_par_iter()
     }
+}
+
+/// The parts of a field between places, which ascend from 0.
+pub(crate) fn cut<'a, T>(field: &'a mut [T], places: &[usize]) -> Vec<&'a mut [T]> {
+    let mut rest = field;
+    let mut out = Vec::with_capacity(places.len());
+    for pair in places.windows(2) {
+        let (part, others) = std::mem::take(&mut rest).split_at_mut(pair[1] - pair[0]);
+        out.push(part);
+        rest = others;
+    }
+    out
 }
 
 /// Length of the pieces in which whole fields are worked on: sums do not depend on the threads.

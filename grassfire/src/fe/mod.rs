@@ -27,6 +27,7 @@ mod window;
 mod tests;
 
 pub(crate) use cholesky::cholesky;
+pub(crate) use grid::cut;
 pub use islands::{Component, components};
 pub use mechanism::{RIGID_MODES, free_modes, free_modes_of};
 pub use pcg::SolveStats;
@@ -46,11 +47,11 @@ pub struct SolverOptions {
     pub tolerance: f64,
     /// Iterations of conjugate gradients at most.
     pub max_iterations: usize,
-    /// Degree of the Chebyshev smoother.
+    /// Degree of the Chebyshev smoother on the finest grid; twice that on coarser ones.
     pub smoother_degree: usize,
-    /// The smoother works on the eigenvalues above the largest one over this.
+    /// The smoother works on the eigenvalues above the largest one over this; over twice this on coarser grids.
     pub smoother_ratio: f64,
-    /// Unknowns of the coarsest grid at most; it is solved directly.
+    /// Unknowns of the coarsest grid at most; it is solved directly. Small problems have a smaller one.
     pub coarsest: usize,
     /// Memory that a solver may take, MB.
     pub max_memory: f64,
@@ -62,8 +63,8 @@ impl Default for SolverOptions {
             tolerance: 1e-5,
             max_iterations: 400,
             smoother_degree: 2,
-            smoother_ratio: 6.0,
-            coarsest: 5000,
+            smoother_ratio: 8.0,
+            coarsest: 13_000,
             max_memory: 16_000.0,
         }
     }

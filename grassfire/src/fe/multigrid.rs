@@ -20,6 +20,10 @@ const POWER_MARGIN: f64 = 1.1;
 /// Visits of the coarser levels below the second: a W cycle where it costs little.
 const VISITS: usize = 2;
 
+/// Coarse levels, which cost little, are smoothed by polynomials of so many times the degree, down to eigenvalues so many
+/// times smaller.
+const COARSE_WORK: usize = 2;
+
 /// The finest grid as it is now.
 #[derive(Clone, Copy)]
 pub(super) struct Fine<'a> {
@@ -97,6 +101,7 @@ impl Multigrid {
         self.coarse.factor(&self.coarsest, &elements)?;
         let options = &self.options;
         for level in &mut self.levels {
+            let mut work = 1;
             let high = match (&mut level.operator, &mut level.diagonal) {
                 (Operator::Fine(_), Diagonal::Node(inverse)) => {
                     node_diagonal(&level.grid, e, self.unit.0, inverse);
@@ -105,12 +110,16 @@ impl Multigrid {
                 (Operator::Coarse(stencil, tables), Diagonal::Component(inverse)) => {
                     galerkin::fill(frame, &level.grid, tables, e, stencil);
                     component_diagonal(&level.grid, stencil, inverse);
+                    work = COARSE_WORK;
                     POWER_MARGIN * level.largest_eigenvalue()
                 }
                 _ => continue,
             };
-            level.coefficients =
-                smoother::coefficients(options.smoother_degree, high, options.smoother_ratio);
+            level.coefficients = smoother::coefficients(
+                work * options.smoother_degree,
+                high,
+                work as f64 * options.smoother_ratio,
+            );
         }
         Ok(())
     }

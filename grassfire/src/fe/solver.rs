@@ -1,12 +1,14 @@
 //! The solver of one voxel model: set the moduli, solve the load cases.
 
+use rayon::prelude::*;
+
 use super::energy::add_energies;
 use super::frame::Frame;
 use super::grid::NodeGrid;
 use super::matrix_free::MatrixFree;
 use super::multigrid::{Fine, Multigrid};
 use super::pcg::{self, SolveStats};
-use super::{FeError, SolverOptions, element};
+use super::{FeError, SolverOptions, element, galerkin};
 use crate::monitor::Monitor;
 
 /// Geometry, supports and loads of a voxel model.
@@ -26,13 +28,17 @@ pub struct VoxelModel {
 
 /// Most levels of a hierarchy.
 const MAX_LEVELS: usize = 7;
+/// Unknowns that are always few enough for a direct solution, and their share of those of the finest grid that is: the
+/// factor must not cost more than the iterations that it spares.
+const FEW: usize = 5000;
+const SHARE: usize = 80;
 
 /// Bytes that a solver takes, about: `voxels` that may have stiffness.
 pub fn memory_estimate(voxels: f64, cases: usize) -> f64 {
     // A node more than voxels each way, and short rows: a tenth more nodes.
     let nodes = 1.1 * voxels + 1e4;
-    // Single: b, x, d, t, the diagonal, u of every case. Double: r, p, q, u, moduli.
-    let starts = if cases > 1 { 3.0 * cases as f64 } else { 0.0 };
+    // Single: b, x, d, t, the diagonal, u of every case but one. Double: r, p, q, u, moduli.
+    let starts = 3.0 * cases.saturating_sub(1) as f64;
     let fine = 4.0 * (4.0 * 3.0 + 1.0 + starts) + 8.0 * (4.0 * 3.0 + 1.0);
     // Coarse levels: 1/7 of stencil and fields, a quarter more nodes at their borders.
     nodes * fine + voxels * 1.25 * (243.0 + 18.0) * 4.0 / 7.0
@@ -49,8 +55,10 @@ pub struct Solver {
     right: Vec<Vec<(usize, f64)>>,
     /// Displacements of the case solved last.
     u: Vec<f64>,
-    /// With several cases, what each starts from: rounded, which is far below the tolerance.
+    /// Displacements of the other cases, which start from them: rounded, which is far below the tolerance.
     starts: Vec<Vec<f32>>,
+    /// Where those of every case lie in `starts`; none for the case solved last.
+    places: Vec<Option<usize>>,
     last: usize,
     stiffness: [[f64; 24]; 24],
     options: SolverOptions,
@@ -61,7 +69,7 @@ impl Solver {
     /// taken.
     ///
     /// 1. The grid is padded so that it can be halved until the coarsest one has at most `options.coarsest` unknowns.
-    /// 2. Galerkin tables of every level are computed; the moduli are set as by [`Solver::set_moduli`].
+    /// 2. Galerkin tables of every level are computed, then the coarse operators as by [`Solver::set_moduli`].
     ///
     /// # Errors
     /// [`FeError::Memory`] before anything large is allocated; [`FeError::Empty`], [`FeError::LoadOnVoid`],
@@ -72,7 +80,7 @@ impl Solver {
         options: &SolverOptions,
     ) -> Result<Self, FeError> {
         check(&model, moduli, options)?;
-        let count = levels(model.dims, options.coarsest);
+        let count = levels(model.dims, moduli, options.coarsest);
         let side = 1usize << (count - 1);
         let occupied = padded(model.dims, side, moduli);
         let grid = NodeGrid::new(model.dims.map(|n| n.next_multiple_of(side)), &occupied);
@@ -87,11 +95,8 @@ impl Solver {
             operator: MatrixFree::new(&stiffness),
             e: frame.grid.scalar(),
             u: frame.grid.field(),
-            starts: if cases > 1 {
-                vec![frame.grid.field(); cases]
-            } else {
-                Vec::new()
-            },
+            starts: vec![frame.grid.field(); cases.saturating_sub(1)],
+            places: (0..cases).map(|case| case.checked_sub(1)).collect(),
             last: 0,
             right,
             model,
@@ -99,16 +104,29 @@ impl Solver {
             stiffness,
             options: options.clone(),
         };
-        out.set_moduli(moduli)?;
+        spread(&out.frame.grid, &out.model, moduli, &mut out.e);
+        out.set_multigrid()?;
         Ok(out)
     }
 
-    /// Takes new moduli, MPa; the last displacements stay as the start of the next solution.
+    /// Takes new moduli, MPa, of `voxels`: places in `[z][y][x]`, ascending; those without a modulus at first stay without.
+    /// The last displacements stay as the start of the next solution.
     ///
     /// # Errors
     /// [`FeError::Factor`].
-    pub fn set_moduli(&mut self, moduli: &[f64]) -> Result<(), FeError> {
-        spread(&self.frame.grid, &self.model, moduli, &mut self.e);
+    pub fn set_moduli(&mut self, voxels: &[u32], moduli: &[f64]) -> Result<(), FeError> {
+        let ([nx, ny, _], grid) = (self.model.dims, &self.frame.grid);
+        for (&v, &modulus) in voxels.iter().zip(moduli) {
+            let v = v as usize;
+            let at = [v % nx, v / nx % ny, v / (nx * ny)];
+            if let Some(place) = grid.place(at) {
+                self.e[grid.first(at[2]) + place] = modulus * self.model.h;
+            }
+        }
+        self.set_multigrid()
+    }
+
+    fn set_multigrid(&mut self) -> Result<(), FeError> {
         self.multigrid.set(Fine {
             frame: &self.frame,
             e: &self.e,
@@ -120,11 +138,13 @@ impl Solver {
     /// # Errors
     /// [`FeError::NotConverged`]; the displacements are what was reached. [`FeError::Cancelled`].
     pub fn solve(&mut self, case: usize, monitor: &Monitor) -> Result<SolveStats, FeError> {
-        self.last = case;
-        if let Some(start) = self.starts.get(case) {
-            for (u, &start) in self.u.iter_mut().zip(start) {
-                *u = f64::from(start);
-            }
+        if let Some(place) = self.places[case].take() {
+            let start = self.starts[place].par_iter_mut();
+            start.zip(&mut self.u).for_each(|(start, u)| {
+                (*start, *u) = (*u as f32, f64::from(*start));
+            });
+            self.places[self.last] = Some(place);
+            self.last = case;
         }
         let limits = (self.options.tolerance, self.options.max_iterations);
         let stats = pcg::solve(
@@ -139,11 +159,6 @@ impl Solver {
             limits,
             monitor,
         )?;
-        if let Some(start) = self.starts.get_mut(case) {
-            for (start, &u) in start.iter_mut().zip(&self.u) {
-                *start = u as f32;
-            }
-        }
         if stats.converged {
             return Ok(stats);
         }
@@ -167,12 +182,12 @@ impl Solver {
         forces.map(|&(at, f)| f * self.u[at]).sum()
     }
 
-    /// Adds `factor u_e' K0 u_e` of the case solved last to every voxel of `out`, for modulus 1 and edge h, `[z][y][x]`,
-    /// mm3.
-    pub fn add_energies(&self, factor: f64, out: &mut [f64]) {
+    /// Adds `factor u_e' K0 u_e` of the case solved last, for modulus 1 and edge h, mm3, to `out`, which has one number for
+    /// each of `voxels`: places in `[z][y][x]`, ascending.
+    pub fn add_energies(&self, factor: f64, voxels: &[u32], out: &mut [f64]) {
         let factor = factor * self.model.h;
         let (grid, dims) = (&self.frame.grid, self.model.dims);
-        add_energies(grid, dims, &self.stiffness, &self.u, factor, out);
+        add_energies(grid, dims, &self.stiffness, &self.u, factor, voxels, out);
     }
 
     /// Displacement of a node in the case solved last, mm; zero where there is no material.
@@ -197,6 +212,24 @@ impl Solver {
             }
         }
         sum
+    }
+
+    /// Multiplies by the stiffness `rounds` times, in single precision like the multigrid or in double: for benchmarks.
+    #[doc(hidden)]
+    pub fn multiply(&self, single: bool, rounds: usize) {
+        let grid = &self.frame.grid;
+        if single {
+            let operator = MatrixFree::<f32>::new(&self.stiffness);
+            let (u, mut product) = (vec![1f32; 3 * grid.len()], grid.field());
+            for _ in 0..rounds {
+                operator.apply(grid, &self.e, &[], &u, &mut product);
+            }
+        } else {
+            let (u, mut product) = (vec![1f64; 3 * grid.len()], grid.field());
+            for _ in 0..rounds {
+                self.operator.apply(grid, &self.e, &[], &u, &mut product);
+            }
+        }
     }
 
     /// Nodes in memory: those of voxels that may have stiffness, and some in short gaps between them.
@@ -248,29 +281,37 @@ fn check(model: &VoxelModel, moduli: &[f64], options: &SolverOptions) -> Result<
     Ok(())
 }
 
-/// Levels until the coarsest grid has at most `coarsest` unknowns.
-fn levels(dims: [usize; 3], coarsest: usize) -> usize {
-    let unknowns = |level: usize| {
-        3 * dims
-            .iter()
-            .map(|&n| n.div_ceil(1 << level) + 1)
-            .product::<usize>()
-    };
-    (0..MAX_LEVELS)
-        .find(|&l| unknowns(l) <= coarsest)
-        .unwrap_or(MAX_LEVELS - 1)
-        + 1
+/// Levels until the coarsest grid has at most `coarsest` unknowns and is small beside the finest one.
+fn levels(dims: [usize; 3], moduli: &[f64], coarsest: usize) -> usize {
+    let (mut n, mut occupied) = (dims, padded(dims, 1, moduli));
+    let mut limit = 0;
+    for level in 1..MAX_LEVELS {
+        let unknowns = 3 * NodeGrid::new(n, &occupied).len();
+        if level == 1 {
+            limit = coarsest.min(FEW.max(unknowns / SHARE));
+        }
+        if unknowns <= limit {
+            return level;
+        }
+        let even = n.map(|n| n.next_multiple_of(2));
+        occupied = galerkin::coarsen(even, &widened(n, even, &occupied));
+        n = even.map(|n| n / 2);
+    }
+    MAX_LEVELS
 }
 
 /// Which elements may have stiffness, on the grid whose sides are multiples of `side`.
-fn padded([nx, ny, nz]: [usize; 3], side: usize, moduli: &[f64]) -> Vec<bool> {
-    let n = [nx, ny, nz].map(|n| n.next_multiple_of(side));
-    let mut out = vec![false; n.iter().product()];
-    for (row, moduli) in moduli.chunks_exact(nx).enumerate() {
-        let to = (row / ny * n[1] + row % ny) * n[0];
-        for (to, &e) in out[to..].iter_mut().zip(moduli) {
-            *to = e > 0.0;
-        }
+fn padded(n: [usize; 3], side: usize, moduli: &[f64]) -> Vec<bool> {
+    let occupied: Vec<bool> = moduli.iter().map(|&e| e > 0.0).collect();
+    widened(n, n.map(|n| n.next_multiple_of(side)), &occupied)
+}
+
+/// The same elements on a larger grid.
+fn widened(from: [usize; 3], to: [usize; 3], occupied: &[bool]) -> Vec<bool> {
+    let mut out = vec![false; to.iter().product()];
+    for (row, occupied) in occupied.chunks_exact(from[0]).enumerate() {
+        let at = (row / from[1] * to[1] + row % from[1]) * to[0];
+        out[at..at + from[0]].copy_from_slice(occupied);
     }
     out
 }

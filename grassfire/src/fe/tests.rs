@@ -37,7 +37,8 @@ fn uniform_cantilever_has_the_known_compliance() {
     let c = solver.compliance();
     assert!((c / 116.179277 - 1.0).abs() < 1e-5, "{c}");
     let mut energies = vec![0.0; moduli.len()];
-    solver.add_energies(e, &mut energies);
+    let voxels: Vec<u32> = (0..moduli.len() as u32).collect();
+    solver.add_energies(e, &voxels, &mut energies);
     let sum: f64 = energies.iter().sum();
     assert!((sum / c - 1.0).abs() < 1e-4, "{sum} {c}");
     let reaction = solver.reactions();
@@ -159,7 +160,8 @@ fn voxels_without_stiffness_change_nothing_and_take_no_memory() {
         for case in 0..5 {
             solver.solve(case, &Monitor::default()).unwrap();
             let mut energies = vec![0.0; moduli.len()];
-            solver.add_energies(2.0, &mut energies);
+            let voxels: Vec<u32> = (0..moduli.len() as u32).collect();
+            solver.add_energies(2.0, &voxels, &mut energies);
             let all: f64 = energies.iter().zip(&moduli).map(|(u, e)| u * e).sum();
             out.extend([solver.compliance(), all]);
             out.extend(solver.displacement(node(16, 4, 0)));

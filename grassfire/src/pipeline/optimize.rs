@@ -13,13 +13,15 @@ use crate::case::{self, Built, Case, Shape};
 use crate::fe::components;
 use crate::io;
 use crate::monitor::{Cancelled, Monitor};
-use crate::remesh::{RemeshOptions, iso_surface};
+use crate::remesh::{Draw, RemeshOptions, drawn_surface, iso_surface};
 use crate::report::{InputFile, OptimizeBlock};
-use crate::topopt::{self, Optimized, Problem, State, TopoptError};
+use crate::topopt::{self, Hull, OptimizeOptions, Optimized, Problem, State, TopoptError};
 use crate::voxel::VoxelGrid;
 
 /// Density of the surface in `proposal_raw.stl`.
 const ISO: f64 = 0.5;
+/// Density of dropped pieces of a part that is drawn.
+const BELOW: f32 = 0.49;
 /// Saved states.
 const STATE: &str = "optimize.state";
 /// Files that `optimize` writes.
@@ -172,7 +174,9 @@ pub(super) fn optimized(
     })?;
     let block = block(problem, &result);
     record.report.optimize = Some(block.clone());
-    record.stage("write", || write(&delivery, problem, &result, monitor))?;
+    record.stage("write", || {
+        write(&delivery, problem, &case.optimize, &result, monitor)
+    })?;
     Ok(Done {
         full: full(problem, &result),
         delivery,
@@ -238,6 +242,7 @@ fn block(problem: &Problem, result: &Optimized) -> OptimizeBlock {
 fn write(
     delivery: &Delivery,
     problem: &Problem,
+    options: &OptimizeOptions,
     result: &Optimized,
     monitor: &Monitor,
 ) -> Result<(), StageError> {
@@ -253,14 +258,30 @@ fn write(
     io::atomic_write(&delivery.path("history.json"), |out| {
         out.write_all(history.as_bytes())
     })?;
-    let surface = grid(surface_field(problem.dims, &density.values, result));
-    let mesh = iso_surface(&surface, ISO, &RemeshOptions::default(), monitor)?;
+    let hull = Hull::of(problem, options)?;
+    let draw = hull.as_ref().map(|hull| Draw {
+        axis: hull.axis,
+        parting: hull.parting(),
+    });
+    // Capped below the surface, columns of a draw still fall away from the parting.
+    let dropped = if draw.is_some() { BELOW } else { 0.0 };
+    let surface = grid(surface_field(
+        problem.dims,
+        &density.values,
+        dropped,
+        result,
+    ));
+    let remesh = RemeshOptions::default();
+    let mesh = match draw {
+        Some(draw) => drawn_surface(&surface, ISO, draw, &remesh, monitor)?,
+        None => iso_surface(&surface, ISO, &remesh, monitor)?,
+    };
     delivery.stl("proposal_raw.stl", &mesh)?;
     Ok(())
 }
 
-/// Densities whose surface is wanted: pieces that were dropped stay empty.
-fn surface_field(dims: [usize; 3], rho: &[f32], result: &Optimized) -> Vec<f32> {
+/// Densities whose surface is wanted: in pieces that were dropped at most `dropped`.
+fn surface_field(dims: [usize; 3], rho: &[f32], dropped: f32, result: &Optimized) -> Vec<f32> {
     let above: Vec<bool> = rho.iter().map(|&r| f64::from(r) > ISO).collect();
     let (labels, pieces) = components(dims, &above);
     let mut keep = vec![false; pieces.len()];
@@ -270,7 +291,7 @@ fn surface_field(dims: [usize; 3], rho: &[f32], result: &Optimized) -> Vec<f32> 
         }
     }
     let part = |(v, &r): (usize, &f32)| match keep.get(labels[v] as usize) {
-        Some(false) => 0.0,
+        Some(false) => r.min(dropped),
         _ => r,
     };
     rho.iter().enumerate().map(part).collect()

@@ -34,56 +34,65 @@ pub(super) fn is_ambiguous(case: usize, axis: usize, side: usize) -> bool {
     s[0] == s[2] && s[1] == s[3] && s[0] != s[1]
 }
 
-/// The components of all 256 ways in which the corners of a cell can be solid (bit c) or empty.
-///
-/// Crossed edges are linked across the faces; on a face with two solid corners on a diagonal the two edges of each
-/// solid corner belong together, so the solid corners are apart.
+/// The lines in which the surface cuts the faces of a cell, as pairs of crossed edges: one about every run of solid corners
+/// of a face, so two solid corners on a diagonal are apart. They go around the surface counter-clockwise seen from the
+/// empty side.
+fn lines(case: usize) -> Vec<(usize, usize)> {
+    let mut out = Vec::new();
+    for face in 0..6 {
+        let mut q = face_corners(face / 2, face % 2);
+        if face % 2 == 0 {
+            q.reverse();
+        }
+        let solid = |i: usize| case >> q[i % 4] & 1 == 1;
+        let edge = |i: usize| edge_between(q[i % 4], q[(i + 1) % 4]);
+        for first in (0..4).filter(|&i| solid(i) && !solid(i + 3)) {
+            let end = (first..first + 4).find(|&i| !solid(i + 1));
+            out.push((edge(first + 3), edge(end.unwrap_or(first))));
+        }
+    }
+    out
+}
+
+/// The polygons of all 256 ways in which the corners of a cell can be solid: crossed edges, counter-clockwise seen from the
+/// empty side.
+pub(super) fn polygons() -> Vec<Vec<Vec<usize>>> {
+    let polygons = |case| {
+        let mut next = [None; 12];
+        for (from, to) in lines(case) {
+            next[from] = Some(to);
+        }
+        let mut out = Vec::new();
+        for edge in 0..12 {
+            let mut polygon = Vec::new();
+            let mut at = edge;
+            while let Some(to) = next[at].take() {
+                polygon.push(at);
+                at = to;
+            }
+            if !polygon.is_empty() {
+                out.push(polygon);
+            }
+        }
+        out
+    };
+    (0..256).map(polygons).collect()
+}
+
+/// The components of all 256 ways in which the corners of a cell can be solid (bit c) or empty: the crossed edges of each
+/// polygon.
 pub(super) fn cases() -> Vec<Case> {
-    (0..256usize)
-        .map(|case| {
-            let mut label: [u8; 12] = std::array::from_fn(|e| {
-                let (a, b) = edge_corners(e);
-                if (case >> a ^ case >> b) & 1 == 1 {
-                    e as u8
-                } else {
-                    NONE
-                }
-            });
-            let mut link = |a: usize, b: usize| {
-                let (from, to) = (label[a].max(label[b]), label[a].min(label[b]));
-                label
-                    .iter_mut()
-                    .filter(|l| **l == from)
-                    .for_each(|l| *l = to);
-            };
-            for face in 0..6 {
-                let q = face_corners(face / 2, face % 2);
-                if is_ambiguous(case, face / 2, face % 2) {
-                    for i in (0..4).filter(|&i| case >> q[i] & 1 == 1) {
-                        link(
-                            edge_between(q[(i + 3) % 4], q[i]),
-                            edge_between(q[i], q[(i + 1) % 4]),
-                        );
-                    }
-                    continue;
-                }
-                let crossed: Vec<usize> = (0..4)
-                    .filter(|&i| (case >> q[i] ^ case >> q[(i + 1) % 4]) & 1 == 1)
-                    .map(|i| edge_between(q[i], q[(i + 1) % 4]))
-                    .collect();
-                if let [a, b] = crossed[..] {
-                    link(a, b);
-                }
+    let case = |polygons: Vec<Vec<usize>>| {
+        let mut component = [NONE; 12];
+        for (number, polygon) in polygons.iter().enumerate() {
+            for &edge in polygon {
+                component[edge] = number as u8;
             }
-            let mut names: Vec<u8> = label.iter().copied().filter(|&l| l != NONE).collect();
-            names.sort_unstable();
-            names.dedup();
-            let component =
-                label.map(|l| names.iter().position(|&n| n == l).map_or(NONE, |n| n as u8));
-            Case {
-                component,
-                count: names.len() as u8,
-            }
-        })
-        .collect()
+        }
+        Case {
+            component,
+            count: polygons.len() as u8,
+        }
+    };
+    polygons().into_iter().map(case).collect()
 }

@@ -9,6 +9,7 @@ mod cut_out;
 mod density;
 mod deviation;
 mod digital;
+mod drawn;
 mod error;
 mod extract;
 mod input;
@@ -27,6 +28,7 @@ mod vanished;
 mod wrap;
 
 pub use cut_out::{Bosses, CutOutOptions, DesignPart, cut_out};
+pub use drawn::{Draw, drawn_surface};
 pub use error::RemeshError;
 pub use options::{Capsule, RemeshOptions};
 pub use resolution::default_voxel;

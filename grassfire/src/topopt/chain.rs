@@ -1,7 +1,7 @@
 //! From the variables to the densities, and back for gradients.
 
-use super::options::{OptimizeOptions, Parting};
-use super::problem::{CORE, DESIGN, FROZEN, OUTSIDE};
+use super::options::OptimizeOptions;
+use super::problem::{FROZEN, OUTSIDE};
 use super::projection::Projection;
 use super::symmetry::Symmetry;
 use super::{Filter, Hull, Problem, TopoptError};
@@ -18,25 +18,14 @@ pub struct Chain<'a> {
     erosion: f64,
 }
 
-/// The fields of one evaluation.
+/// The fields of one evaluation, one value a design voxel: spaces fill but a part of their grid.
 #[derive(Debug, Clone, Default)]
 pub struct Fields {
-    /// Filtered, frozen voxels full; kept with a hull only.
+    /// Filtered; kept with a hull only.
     filtered: Vec<f64>,
-    /// After the hull, design voxels only.
+    /// After the hull.
     hulled: Vec<f64>,
-    /// Densities: 0 outside, 1 where frozen.
-    pub rho: Vec<f64>,
-    /// The thinner structure whose stiffness counts, with the robust formulation.
-    pub eroded: Option<Vec<f64>>,
     projection: Option<Projection>,
-}
-
-impl Fields {
-    /// The densities whose stiffness counts.
-    pub fn stiff(&self) -> &[f64] {
-        self.eroded.as_deref().unwrap_or(&self.rho)
-    }
 }
 
 impl<'a> Chain<'a> {
@@ -45,21 +34,13 @@ impl<'a> Chain<'a> {
     /// # Errors
     /// [`TopoptError::Plane`], [`TopoptError::DrawDirection`], [`TopoptError::FrozenUndercut`].
     pub fn new(problem: &'a Problem, options: &OptimizeOptions) -> Result<Self, TopoptError> {
-        let inside: Vec<bool> = (0..problem.labels.len())
-            .map(|v| problem.is_active(v))
-            .collect();
-        let filter = Filter::new(
-            options.filter,
-            problem.dims,
-            options.radius(problem.h),
-            &inside,
-            options.boundary,
-        );
+        let radius = options.radius(problem.h);
+        let filter = Filter::new(options.filter, problem, radius, options.boundary);
         let symmetry = Symmetry::new(problem, &options.symmetry)?;
         let chain = Self {
             problem,
             filter,
-            hull: hull(problem, options)?,
+            hull: Hull::of(problem, options)?,
             symmetry,
             erosion: options.robust,
         };
@@ -95,128 +76,76 @@ impl<'a> Chain<'a> {
         })
     }
 
-    /// Densities for the variables `x`; without `beta` nothing is projected.
-    pub fn forward(&self, x: &[f64], beta: Option<f64>) -> Fields {
-        let labels = &self.problem.labels;
-        let mut filtered = self.filter.forward(x);
-        for (v, &label) in filtered.iter_mut().zip(labels) {
-            match label {
-                OUTSIDE | CORE => *v = 0.0,
-                FROZEN => *v = 1.0,
-                _ => {}
-            }
-        }
-        let (filtered, hulled) = match &self.hull {
+    /// Filters the variables `x`, one a design voxel; without `beta` nothing will be projected.
+    pub fn forward(&self, x: &[f64], beta: Option<f64>, fields: &mut Fields) {
+        let filtered = self.filter.forward(self.problem, x);
+        match &self.hull {
             Some(hull) => {
-                let hulled = hull.smooth(&filtered);
-                (filtered, hulled)
+                let hulled = hull.smooth(&self.problem.on_grid(&filtered, 1.0));
+                fields.hulled.clone_from(&self.problem.at_design(&hulled));
+                fields.filtered.clone_from(&filtered);
             }
-            None => (Vec::new(), filtered),
-        };
-        let hulled: Vec<f64> = self.problem.design().map(|v| hulled[v]).collect();
-        let projection = beta.map(|beta| Projection::keeping_volume(beta, &hulled));
-        let densities = |projection: Option<Projection>| -> Vec<f64> {
-            let frozen = |&l: &u8| f64::from(u8::from(l == FROZEN));
-            let mut rho: Vec<f64> = labels.iter().map(frozen).collect();
-            for (v, &m) in self.problem.design().zip(&hulled) {
-                rho[v] = projection.map_or(m, |p| p.value(m)).clamp(0.0, 1.0);
-            }
-            self.symmetry.copy(self.problem, &mut rho);
-            rho
-        };
-        let eroded = projection.filter(|_| self.erosion > 0.0);
-        Fields {
-            rho: densities(projection),
-            eroded: eroded.map(|p| densities(Some(p.shifted(self.erosion)))),
-            filtered,
-            hulled,
-            projection,
+            None => fields.hulled.clone_from(&filtered),
         }
+        fields.projection = beta.map(|beta| Projection::keeping_volume(beta, &fields.hulled));
+    }
+
+    /// The densities.
+    pub fn densities(&self, fields: &Fields) -> Vec<f64> {
+        self.projected(fields, fields.projection)
+    }
+
+    /// The densities of the thinner structure whose stiffness counts with the robust formulation.
+    pub fn eroded(&self, fields: &Fields) -> Option<Vec<f64>> {
+        let projection = fields.projection.filter(|_| self.erosion > 0.0)?;
+        Some(self.projected(fields, Some(projection.shifted(self.erosion))))
+    }
+
+    fn projected(&self, fields: &Fields, projection: Option<Projection>) -> Vec<f64> {
+        let value = |&m: &f64| projection.map_or(m, |p| p.value(m)).clamp(0.0, 1.0);
+        let mut rho: Vec<f64> = fields.hulled.iter().map(value).collect();
+        self.symmetry.copy(&mut rho);
+        rho
     }
 
     /// Gradient by the variables of a function with gradient `g` by the densities whose stiffness counts. The threshold of
     /// the projection follows the variables, which is part of the derivative.
-    pub fn gradient(&self, fields: &Fields, g: &[f64]) -> Vec<f64> {
-        let design = || self.problem.design().zip(&fields.hulled);
-        let mut of_hulled = vec![0.0; g.len()];
-        match fields.projection {
-            None => design().for_each(|(v, _)| of_hulled[v] = g[v]),
-            Some(p) => {
-                let stiff = p.shifted(self.erosion);
-                // At the end of its range the shifted threshold stands still.
-                let still = self.erosion > 0.0 && stiff.eta >= Projection::LAST;
-                let follows = if still { 0.0 } else { 1.0 };
-                let (mut top, mut bottom) = (0.0, 0.0);
-                for (v, &m) in design() {
-                    top += g[v] * follows * stiff.by_eta(m);
-                    bottom += p.by_eta(m);
-                }
-                let factor = if bottom == 0.0 { 0.0 } else { top / bottom };
-                for (v, &m) in design() {
-                    of_hulled[v] = g[v] * stiff.slope(m) + factor * (1.0 - p.slope(m));
-                }
+    pub fn gradient(&self, fields: &Fields, mut g: Vec<f64>) -> Vec<f64> {
+        if let Some(p) = fields.projection {
+            let stiff = p.shifted(self.erosion);
+            // At the end of its range the shifted threshold stands still.
+            let still = self.erosion > 0.0 && stiff.eta >= Projection::LAST;
+            let follows = if still { 0.0 } else { 1.0 };
+            let (mut top, mut bottom) = (0.0, 0.0);
+            for (g, &m) in g.iter().zip(&fields.hulled) {
+                top += g * follows * stiff.by_eta(m);
+                bottom += p.by_eta(m);
+            }
+            let factor = if bottom == 0.0 { 0.0 } else { top / bottom };
+            for (g, &m) in g.iter_mut().zip(&fields.hulled) {
+                *g = *g * stiff.slope(m) + factor * (1.0 - p.slope(m));
             }
         }
-        self.to_variables(fields, of_hulled)
+        self.to_variables(fields, g)
     }
 
     /// Gradient of the volume (in voxels) by the variables; the projection does not change it.
     pub fn volume_gradient(&self, fields: &Fields) -> Vec<f64> {
-        let design = |&l: &u8| f64::from(u8::from(l == DESIGN));
-        let ones = self.problem.labels.iter().map(design).collect();
-        self.to_variables(fields, ones)
+        self.to_variables(fields, vec![1.0; fields.hulled.len()])
     }
 
     fn to_variables(&self, fields: &Fields, of_hulled: Vec<f64>) -> Vec<f64> {
-        let mut g = match &self.hull {
-            Some(hull) => hull.transpose(&fields.filtered, &of_hulled),
+        let problem = self.problem;
+        let of_filtered = match &self.hull {
+            Some(hull) => {
+                let filtered = problem.on_grid(&fields.filtered, 1.0);
+                let of_hulled = problem.on_grid(&of_hulled, 0.0);
+                problem.at_design(&hull.transpose(&filtered, &of_hulled))
+            }
             None => of_hulled,
         };
-        self.mask(&mut g);
-        let mut g = self.filter.transpose(&g);
-        self.mask(&mut g);
-        self.symmetry.average(self.problem, &mut g);
+        let mut g = self.filter.transpose(problem, of_filtered);
+        self.symmetry.average(&mut g);
         g
     }
-
-    /// Zero but on design voxels.
-    fn mask(&self, g: &mut [f64]) {
-        let pairs = g.iter_mut().zip(&self.problem.labels);
-        pairs
-            .filter(|(_, l)| **l != DESIGN)
-            .for_each(|(g, _)| *g = 0.0);
-    }
-}
-
-/// The hull that the options ask for.
-fn hull(problem: &Problem, options: &OptimizeOptions) -> Result<Option<Hull>, TopoptError> {
-    let Some(draw) = &options.draw else {
-        return Ok(None);
-    };
-    let dir = draw.dir;
-    let size = dir.iter().map(|d| d * d).sum::<f64>().sqrt();
-    let axis = (0..3).find(|&a| size > 0.0 && dir[a].abs() >= (1.0 - 1e-9) * size);
-    let Some(axis) = axis else {
-        return Err(TopoptError::DrawDirection { dir });
-    };
-    let layers = (draw.at - problem.origin[axis]) / problem.h;
-    let layer = layers.round();
-    if draw.parting == Parting::Plane
-        && ((layers - layer).abs() > 1e-6 || layer < 0.0 || layer > problem.dims[axis] as f64)
-    {
-        return Err(TopoptError::Plane {
-            what: "the parting plane",
-            at: draw.at,
-            h: problem.h,
-            nearest: problem.origin[axis] + problem.h * layer.clamp(0.0, problem.dims[axis] as f64),
-        });
-    }
-    let layer = layer.max(0.0) as usize;
-    Ok(Some(Hull::new(
-        problem.dims,
-        axis,
-        dir[axis] > 0.0,
-        draw.parting,
-        layer,
-    )))
 }

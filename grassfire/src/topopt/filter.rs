@@ -5,8 +5,12 @@ use rayon::prelude::*;
 
 use super::helmholtz::Helmholtz;
 use super::options::{Boundary, FilterKind};
+use super::problem::{DESIGN, FROZEN, Problem};
+use crate::fe::cut;
 
-/// `x~_e = sum_i w_ei x_i / sum_i w_ei`, and its transpose.
+/// `x~_e = sum_i w_ei x_i / sum_i w_ei`, and its transpose, for fields with one value a design voxel.
+///
+/// Frozen voxels count as full; what is outside takes no part.
 ///
 /// Cone: `w_ei = max(0, R - |c_e - c_i|)`. T. E. Bruns, D. A. Tortorelli: Topology optimization of non-linear elastic
 /// structures and compliant mechanisms, 2001, doi:10.1016/S0045-7825(00)00278-4.
@@ -19,46 +23,39 @@ pub enum Filter {
 }
 
 impl Filter {
-    /// `radius` in voxels; `inside`: voxels that take part, `[z][y][x]`.
-    pub fn new(
-        kind: FilterKind,
-        dims: [usize; 3],
-        radius: f64,
-        inside: &[bool],
-        boundary: Boundary,
-    ) -> Self {
+    /// `radius` in voxels.
+    pub fn new(kind: FilterKind, problem: &Problem, radius: f64, boundary: Boundary) -> Self {
         match kind {
-            FilterKind::Cone => Self::Cone(Cone::new(dims, radius, inside, boundary)),
-            FilterKind::Helmholtz => Self::Helmholtz(Helmholtz::new(dims, radius, inside)),
+            FilterKind::Cone => Self::Cone(Cone::new(problem, radius, boundary)),
+            FilterKind::Helmholtz => Self::Helmholtz(Helmholtz::new(problem, radius)),
         }
     }
 
-    /// The filtered field; zero where nothing takes part.
-    pub fn forward(&self, x: &[f64]) -> Vec<f64> {
+    /// The filtered field.
+    pub fn forward(&self, problem: &Problem, x: &[f64]) -> Vec<f64> {
         match self {
             Self::Cone(cone) => {
-                let mut out = cone.weigh(x.par_iter().copied());
+                let mut out = cone.weigh(&problem.labels, x, 1.0);
                 out.par_iter_mut()
                     .zip(&cone.inverse)
                     .for_each(|(v, s)| *v *= s);
                 out
             }
-            Self::Helmholtz(filter) => filter.solve(x),
+            Self::Helmholtz(filter) => problem.at_design(&filter.solve(&problem.on_grid(x, 1.0))),
         }
     }
 
     /// The transpose.
-    pub fn transpose(&self, g: &[f64]) -> Vec<f64> {
+    pub fn transpose(&self, problem: &Problem, mut g: Vec<f64>) -> Vec<f64> {
         match self {
             Self::Cone(cone) => {
-                let mut out = cone.weigh(g.par_iter().zip(&cone.inverse).map(|(g, s)| g * s));
-                out.par_iter_mut()
+                g.par_iter_mut()
                     .zip(&cone.inverse)
-                    .for_each(|(v, s)| *v = if *s > 0.0 { *v } else { 0.0 });
-                out
+                    .for_each(|(g, s)| *g *= s);
+                cone.weigh(&problem.labels, &g, 0.0)
             }
             // The operator is symmetric.
-            Self::Helmholtz(filter) => filter.solve(g),
+            Self::Helmholtz(filter) => problem.at_design(&filter.solve(&problem.on_grid(&g, 0.0))),
         }
     }
 }
@@ -72,12 +69,14 @@ pub struct Cone {
     /// Rows of the cone: steps along y and z, and weights from `-reach` to `reach` along x.
     rows: Vec<([usize; 2], Vec<f64>)>,
     reflect: bool,
-    /// One over the sum of the weights; 0 where a voxel does not take part.
+    /// Design voxels before every plane, and their number.
+    first: Vec<usize>,
+    /// One over the sum of the weights around every design voxel.
     inverse: Vec<f64>,
 }
 
 impl Cone {
-    fn new(dims: [usize; 3], radius: f64, inside: &[bool], boundary: Boundary) -> Self {
+    fn new(problem: &Problem, radius: f64, boundary: Boundary) -> Self {
         // A radius of one or less is the identity.
         let radius = radius.max(1.0);
         let reach = (radius - 1e-9).ceil() as usize - 1;
@@ -97,83 +96,151 @@ impl Cone {
             })
             .filter(|(_, weights)| weights.iter().any(|&w| w > 1e-12))
             .collect();
+        let mut first = vec![0];
+        for plane in problem.labels.chunks(problem.dims[0] * problem.dims[1]) {
+            let design = plane.iter().filter(|&&l| l == DESIGN).count();
+            first.push(first[first.len() - 1] + design);
+        }
         let mut cone = Self {
-            dims,
+            dims: problem.dims,
             reach,
             rows,
             reflect: boundary == Boundary::Reflect,
-            inverse: Vec::new(),
+            inverse: vec![1.0; first[first.len() - 1]],
+            first,
         };
-        let sums = cone.weigh(inside.par_iter().map(|&i| f64::from(u8::from(i))));
-        cone.inverse = sums
-            .iter()
-            .zip(inside)
-            .map(|(&s, &inside)| if inside && s > 0.0 { 1.0 / s } else { 0.0 })
-            .collect();
+        let mut sums = cone.weigh(&problem.labels, &cone.inverse, 1.0);
+        sums.iter_mut().for_each(|s| *s = 1.0 / *s);
+        cone.inverse = sums;
         cone
     }
 
-    /// Weighted sums around every voxel.
-    fn weigh(&self, x: impl IndexedParallelIterator<Item = f64>) -> Vec<f64> {
-        let [nx, ny, nz] = self.dims;
-        let k = self.reach;
-        let (px, py) = (nx + 2 * k, ny + 2 * k);
-        let x: Vec<f64> = x.collect();
-        let padded = self.pad(&x);
-        let mut out = vec![0.0; nx * ny * nz];
-        out.par_chunks_mut(nx * ny)
-            .enumerate()
-            .for_each(|(z, plane)| {
-                Arch::new().dispatch(|| {
-                    for y in 0..ny {
-                        let out = &mut plane[y * nx..(y + 1) * nx];
-                        for ([dy, dz], weights) in &self.rows {
-                            let from = ((z + dz) * py + y + dy) * px;
-                            let row = &padded[from..from + px];
-                            for (dx, &w) in weights.iter().enumerate().filter(|(_, w)| **w > 1e-12)
-                            {
-                                for (o, v) in out.iter_mut().zip(&row[dx..dx + nx]) {
-                                    *o += w * v;
-                                }
-                            }
-                        }
+    /// Weighted sums around every design voxel; `frozen`: value of frozen voxels.
+    ///
+    /// The planes under the cone are written out in full, one after another, so that no field of the whole grid is needed.
+    fn weigh(&self, labels: &[u8], x: &[f64], frozen: f64) -> Vec<f64> {
+        let [nx, ny, _] = self.dims;
+        let mut out = vec![0.0; x.len()];
+        let planes = cut(&mut out, &self.first);
+        planes.into_par_iter().enumerate().for_each_init(
+            || Planes::new(self),
+            |planes, (z, mut out)| {
+                if out.is_empty() {
+                    return;
+                }
+                planes.load(self, labels, x, frozen, z);
+                let mut sums = vec![0.0; nx];
+                for y in 0..ny {
+                    let labels = &labels[(z * ny + y) * nx..][..nx];
+                    let wanted = || (0..nx).filter(|&x| labels[x] == DESIGN);
+                    let count = wanted().count();
+                    if count == 0 {
+                        continue;
                     }
-                });
-            });
+                    Arch::new().dispatch(|| self.row(planes, y, z, &mut sums));
+                    let (row, rest) = std::mem::take(&mut out).split_at_mut(count);
+                    for (to, x) in row.iter_mut().zip(wanted()) {
+                        *to = sums[x];
+                    }
+                    out = rest;
+                }
+            },
+        );
         out
     }
 
-    /// The field with `reach` more voxels on all sides: mirrored or zero.
-    fn pad(&self, x: &[f64]) -> Vec<f64> {
-        let k = self.reach;
-        let [px, py, pz] = self.dims.map(|n| n + 2 * k);
-        let source = |i: usize, n: usize| -> Option<usize> {
-            let at = i as i64 - k as i64;
-            if (0..n as i64).contains(&at) {
-                return Some(at as usize);
-            }
-            let mirrored = if at < 0 {
-                -1 - at
-            } else {
-                2 * n as i64 - 1 - at
-            };
-            (self.reflect && (0..n as i64).contains(&mirrored)).then_some(mirrored as usize)
-        };
-        let [nx, ny, nz] = self.dims;
-        let columns: Vec<Option<usize>> = (0..px).map(|i| source(i, nx)).collect();
-        let mut out = vec![0.0; px * py * pz];
-        out.par_chunks_mut(px * py)
-            .enumerate()
-            .for_each(|(z, plane)| {
-                let Some(z) = source(z, nz) else { return };
-                for (y, row) in plane.chunks_mut(px).enumerate() {
-                    let Some(y) = source(y, ny) else { continue };
-                    let from = &x[(z * ny + y) * nx..][..nx];
-                    for (to, column) in row.iter_mut().zip(&columns) {
-                        *to = column.map_or(0.0, |x| from[x]);
-                    }
+    /// Weighted sums around all voxels of row (y, z).
+    #[inline(always)]
+    fn row(&self, planes: &Planes, y: usize, z: usize, sums: &mut [f64]) {
+        let nx = self.dims[0];
+        sums.fill(0.0);
+        for ([dy, dz], weights) in &self.rows {
+            let row = planes.row(y + dy, z + dz);
+            for (dx, &w) in weights.iter().enumerate().filter(|(_, w)| **w > 1e-12) {
+                for (sum, v) in sums.iter_mut().zip(&row[dx..dx + nx]) {
+                    *sum += w * v;
                 }
-            });
-        out
+            }
+        }
+    }
+
+    /// Where the value of padded place `i` comes from along an axis of `n` voxels: mirrored or nowhere beyond the ends.
+    fn source(&self, i: usize, n: usize) -> Option<usize> {
+        let at = i as i64 - self.reach as i64;
+        if (0..n as i64).contains(&at) {
+            return Some(at as usize);
+        }
+        let mirrored = if at < 0 {
+            -1 - at
+        } else {
+            2 * n as i64 - 1 - at
+        };
+        (self.reflect && (0..n as i64).contains(&mirrored)).then_some(mirrored as usize)
+    }
+}
+
+/// The planes under the cone, with `reach` more voxels on all sides.
+struct Planes {
+    /// Padded voxels along x and y.
+    size: [usize; 2],
+    /// Source of every padded column.
+    columns: Vec<Option<usize>>,
+    /// The padded plane in every place, by the remainder of its number.
+    held: Vec<Option<usize>>,
+    values: Vec<f64>,
+}
+
+impl Planes {
+    fn new(cone: &Cone) -> Self {
+        let [nx, ny, _] = cone.dims;
+        let (width, size) = (2 * cone.reach + 1, [nx, ny].map(|n| n + 2 * cone.reach));
+        Self {
+            size,
+            columns: (0..size[0]).map(|i| cone.source(i, nx)).collect(),
+            held: vec![None; width],
+            values: vec![0.0; width * size[0] * size[1]],
+        }
+    }
+
+    /// Moves to plane `z`; planes that it holds already are kept.
+    fn load(&mut self, cone: &Cone, labels: &[u8], x: &[f64], frozen: f64, z: usize) {
+        let [nx, ny, nz] = cone.dims;
+        let [px, py] = self.size;
+        let mut plane = vec![0.0; nx * ny];
+        for padded in z..z + self.held.len() {
+            let place = padded % self.held.len();
+            if self.held[place] == Some(padded) {
+                continue;
+            }
+            self.held[place] = Some(padded);
+            let to = &mut self.values[place * px * py..][..px * py];
+            to.fill(0.0);
+            let Some(from) = cone.source(padded, nz) else {
+                continue;
+            };
+            let mut design = x[cone.first[from]..cone.first[from + 1]].iter();
+            for (v, &label) in plane.iter_mut().zip(&labels[from * nx * ny..]) {
+                *v = match label {
+                    DESIGN => design.next().copied().unwrap_or_default(),
+                    FROZEN => frozen,
+                    _ => 0.0,
+                };
+            }
+            for (y, row) in to.chunks_mut(px).enumerate() {
+                let Some(y) = cone.source(y, ny) else {
+                    continue;
+                };
+                let from = &plane[y * nx..][..nx];
+                for (to, column) in row.iter_mut().zip(&self.columns) {
+                    *to = column.map_or(0.0, |x| from[x]);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn row(&self, y: usize, padded: usize) -> &[f64] {
+        let [px, py] = self.size;
+        &self.values[(padded % self.held.len() * py + y) * px..][..px]
     }
 }

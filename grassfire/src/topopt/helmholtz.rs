@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use super::Problem;
+
 /// Residual at which the equation counts as solved.
 const TOLERANCE: f64 = 1e-12;
 /// Iterations at most; 64 voxels of radius need about 150.
@@ -23,14 +25,15 @@ pub struct Helmholtz {
 
 impl Helmholtz {
     /// `radius` in voxels.
-    pub(super) fn new(dims: [usize; 3], radius: f64, inside: &[bool]) -> Self {
+    pub(super) fn new(problem: &Problem, radius: f64) -> Self {
+        let voxels = problem.labels.len();
         let mut out = Self {
-            dims,
+            dims: problem.dims,
             square: radius * radius / 12.0,
-            inside: inside.to_vec(),
-            diagonal: vec![1.0; inside.len()],
+            inside: (0..voxels).map(|v| problem.is_active(v)).collect(),
+            diagonal: Vec::new(),
         };
-        let diagonal: Vec<f64> = (0..inside.len())
+        let diagonal: Vec<f64> = (0..voxels)
             .into_par_iter()
             .map(|v| 1.0 + out.square * out.neighbours(v).count() as f64)
             .collect();
@@ -53,7 +56,7 @@ impl Helmholtz {
         })
     }
 
-    /// The filtered field; zero where a voxel does not take part.
+    /// The filtered field of the whole grid; zero where a voxel does not take part.
     pub(super) fn solve(&self, b: &[f64]) -> Vec<f64> {
         let inside = |v: usize| if self.inside[v] { 1.0 } else { 0.0 };
         let b: Vec<f64> = b.iter().enumerate().map(|(v, b)| b * inside(v)).collect();

@@ -1,6 +1,7 @@
 //! Draw hulls: running maxima along the draw direction, so that nothing is undercut.
 
-use super::options::Parting;
+use super::options::{OptimizeOptions, Parting};
+use super::{Problem, TopoptError};
 
 /// Smoothing of maxima and minima.
 const SMOOTH: f64 = 1e-3;
@@ -51,6 +52,48 @@ impl Hull {
             parting,
             layer: layer.min(dims[axis]),
         }
+    }
+
+    /// The hull that the options ask for.
+    ///
+    /// # Errors
+    /// [`TopoptError::Plane`], [`TopoptError::DrawDirection`].
+    pub fn of(problem: &Problem, options: &OptimizeOptions) -> Result<Option<Self>, TopoptError> {
+        let Some(draw) = &options.draw else {
+            return Ok(None);
+        };
+        let dir = draw.dir;
+        let size = dir.iter().map(|d| d * d).sum::<f64>().sqrt();
+        let axis = (0..3).find(|&a| size > 0.0 && dir[a].abs() >= (1.0 - 1e-9) * size);
+        let Some(axis) = axis else {
+            return Err(TopoptError::DrawDirection { dir });
+        };
+        let layers = (draw.at - problem.origin[axis]) / problem.h;
+        let layer = layers.round();
+        if draw.parting == Parting::Plane
+            && ((layers - layer).abs() > 1e-6 || layer < 0.0 || layer > problem.dims[axis] as f64)
+        {
+            return Err(TopoptError::Plane {
+                what: "the parting plane",
+                at: draw.at,
+                h: problem.h,
+                nearest: problem.origin[axis]
+                    + problem.h * layer.clamp(0.0, problem.dims[axis] as f64),
+            });
+        }
+        let layer = layer.max(0.0) as usize;
+        Ok(Some(Self::new(
+            problem.dims,
+            axis,
+            dir[axis] > 0.0,
+            draw.parting,
+            layer,
+        )))
+    }
+
+    /// First layer above the parting plane; none where there is no such plane.
+    pub fn parting(&self) -> Option<usize> {
+        (self.parting == Parting::Plane).then_some(self.layer)
     }
 
     /// The hull with smooth maxima.

@@ -35,19 +35,15 @@ impl Default for MmaOptions {
     }
 }
 
-/// Variables of the last two iterations and their asymptotes.
+/// What the asymptotes follow from; empty at first.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mma {
     /// Constants.
     pub options: MmaOptions,
-    /// Variables one and two iterations ago; empty before.
-    pub last: Vec<f64>,
-    /// See `last`.
-    pub before: Vec<f64>,
-    /// Lower asymptotes.
-    pub low: Vec<f64>,
-    /// Upper asymptotes.
-    pub high: Vec<f64>,
+    /// Signs of the last step, 0 where a variable stood still.
+    pub steps: Vec<i8>,
+    /// Distance of both asymptotes from the variable.
+    pub reach: Vec<f32>,
 }
 
 /// The separable approximation at one variable: `p / (high - x) + q / (x - low)` of objective and constraint.
@@ -69,8 +65,8 @@ impl Mma {
     ///
     /// Variables whose gradients `df` and `dg` are both 0 stay. K. Svanberg: The method of moving asymptotes, 1987,
     /// doi:10.1002/nme.1620240207.
-    pub fn update(&mut self, x: &[f64], df: &[f64], g: f64, dg: &[f64], step: f64) -> Vec<f64> {
-        self.move_asymptotes(x);
+    pub fn update(&mut self, x: &mut [f64], df: &[f64], g: f64, dg: &[f64], step: f64) {
+        self.start(x.len());
         // Terms are made again for every multiplier: storing them would take more memory than all else here.
         let sum = |of: &(dyn Fn(&Term, f64) -> f64 + Sync)| -> f64 {
             let parts: Vec<f64> = (0..x.len().div_ceil(CHUNK))
@@ -105,40 +101,41 @@ impl Mma {
                 }
             })
             .collect();
-        self.before = std::mem::replace(&mut self.last, x.to_vec());
-        new
+        self.move_asymptotes(x, &new);
+        x.copy_from_slice(&new);
     }
 
-    fn move_asymptotes(&mut self, x: &[f64]) {
-        let o = &self.options;
-        if self.before.len() != x.len() {
-            self.low = x.iter().map(|x| x - o.initial).collect();
-            self.high = x.iter().map(|x| x + o.initial).collect();
-            return;
+    /// Takes the memory for `n` variables; a new start when there were others.
+    pub fn start(&mut self, n: usize) {
+        if self.reach.len() != n {
+            self.steps = vec![0; n];
+            self.reach = vec![self.options.initial as f32; n];
         }
-        let history = self.last.par_iter().zip(&self.before);
-        let asymptotes = self.low.par_iter_mut().zip(&mut self.high);
-        x.par_iter().zip(history).zip(asymptotes).for_each(
-            |((&x, (&last, &before)), (low, high))| {
-                let turn = (x - last) * (last - before);
-                let factor = if turn < 0.0 {
-                    o.narrower
-                } else if turn > 0.0 {
-                    o.wider
-                } else {
-                    1.0
-                };
-                *low = (x - factor * (last - *low)).clamp(x - o.farthest, x - o.nearest);
-                *high = (x + factor * (*high - last)).clamp(x + o.nearest, x + o.farthest);
-            },
-        );
+    }
+
+    /// Nearer after an oscillation, farther after two steps the same way.
+    fn move_asymptotes(&mut self, x: &[f64], new: &[f64]) {
+        let o = &self.options;
+        let state = self.steps.par_iter_mut().zip(&mut self.reach);
+        let steps = x.par_iter().zip(new);
+        steps.zip(state).for_each(|((x, new), (before, reach))| {
+            let now = (new > x) as i8 - (new < x) as i8;
+            let factor = match now * *before {
+                1 => o.wider,
+                -1 => o.narrower,
+                _ => 1.0,
+            };
+            *reach = (factor * f64::from(*reach)).clamp(o.nearest, o.farthest) as f32;
+            *before = now;
+        });
     }
 
     fn term(&self, i: usize, x: f64, gradients: [f64; 2], step: f64) -> Term {
         if gradients == [0.0; 2] {
             return Term::default();
         }
-        let (low, high) = (self.low[i], self.high[i]);
+        let reach = f64::from(self.reach[i]);
+        let (low, high) = (x - reach, x + reach);
         let (above, below) = ((high - x).powi(2), (x - low).powi(2));
         let p = |d: f64| above * (1.001 * d.max(0.0) + 0.001 * (-d).max(0.0) + 1e-5);
         let q = |d: f64| below * (0.001 * d.max(0.0) + 1.001 * (-d).max(0.0) + 1e-5);

@@ -56,6 +56,22 @@ impl Problem {
         labels.filter(|(_, l)| **l == DESIGN).map(|(v, _)| v)
     }
 
+    /// Values of the design voxels on the whole grid: `frozen` in frozen voxels, 0 outside.
+    pub fn on_grid(&self, design: &[f64], frozen: f64) -> Vec<f64> {
+        let mut design = design.iter();
+        let value = |&label: &u8| match label {
+            DESIGN => design.next().copied().unwrap_or_default(),
+            FROZEN => frozen,
+            _ => 0.0,
+        };
+        self.labels.iter().map(value).collect()
+    }
+
+    /// The values of a field of the whole grid in design voxels.
+    pub fn at_design(&self, field: &[f64]) -> Vec<f64> {
+        self.design().map(|v| field[v]).collect()
+    }
+
     /// Number of voxels with a label.
     pub fn count(&self, label: u8) -> usize {
         self.labels.iter().filter(|&&l| l == label).count()

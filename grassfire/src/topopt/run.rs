@@ -130,7 +130,7 @@ pub fn optimize(
         ..
     } = run;
     drop(solver);
-    out.rho = state.rho;
+    out.rho = problem.on_grid(&state.rho, 1.0);
     out.binary = binary(problem, &chain, &out.rho, target);
     out.symmetry_error = chain.symmetry.error(problem, &out.rho).0;
     out.fallbacks = fallbacks;
@@ -190,6 +190,10 @@ struct Run<'a> {
     state: State,
     /// Voxels of the variables.
     design: Vec<u32>,
+    /// What lives as long as a solution has its place once: fields that come and go would split the memory.
+    fields: Fields,
+    /// Strain energy of every design voxel for modulus 1, weighted with the derivative of the objective.
+    energy: Vec<f64>,
     /// Full voxels allowed.
     target: f64,
     /// Design and frozen voxels.
@@ -197,11 +201,10 @@ struct Run<'a> {
     fallbacks: usize,
 }
 
-/// Compliances, and the strain energy of every voxel for modulus 1, weighted with the derivative of the objective.
+/// Compliances.
 struct Response {
     cases: Vec<f64>,
     compliance: f64,
-    energy: Vec<f64>,
     iterations: usize,
 }
 
@@ -217,24 +220,17 @@ impl<'a> Run<'a> {
         let (design, frozen) = (problem.count(DESIGN) as f64, problem.count(FROZEN) as f64);
         let active = design + frozen;
         let chain = Chain::new(problem, options)?;
-        let state = resume.unwrap_or_else(|| {
+        let mut state = resume.unwrap_or_else(|| {
             let start = ((target - frozen) / design).min(1.0);
             State {
                 x: vec![start; design as usize],
-                rho: vec![0.0; problem.labels.len()],
+                rho: vec![0.0; design as usize],
                 ..State::default()
             }
         });
+        state.mma.start(state.x.len());
         monitor.step(STAGE, "setting up the solver", 0.0)?;
-        let present: Vec<f64> = (0..problem.labels.len())
-            .map(|v| {
-                if problem.is_active(v) {
-                    problem.young
-                } else {
-                    0.0
-                }
-            })
-            .collect();
+        let present = problem.on_grid(&vec![problem.young; design as usize], problem.young);
         let solver = Solver::new(problem.model(), &present, solver_options)?;
         Ok(Self {
             problem,
@@ -243,6 +239,8 @@ impl<'a> Run<'a> {
             solver,
             state,
             design: problem.design().map(|v| v as u32).collect(),
+            fields: Fields::default(),
+            energy: vec![0.0; design as usize],
             target,
             active,
             fallbacks: 0,
@@ -266,15 +264,16 @@ impl<'a> Run<'a> {
         let i = self.state.iteration;
         let penalty = self.options.penalty_at(i);
         let beta = (self.options.beta > 0.0).then(|| self.options.beta_at(i));
-        let mut fields = self.chain.forward(&self.on_grid(&self.state.x), beta);
-        // The densities of the last iteration go before the solver takes its memory.
-        let change = mean_change(&self.state.rho, &fields.rho, self.active);
-        self.state.rho = std::mem::take(&mut fields.rho);
-        let stiff = fields.eroded.take();
-        let response = self.respond(stiff.as_deref(), penalty, monitor)?;
-        let (df, dv) = self.gradients(&fields, stiff, penalty, response.energy);
+        let chain = &self.chain;
+        chain.forward(&self.state.x, beta, &mut self.fields);
+        let rho = chain.densities(&self.fields);
+        let change = mean_change(&self.state.rho, &rho, self.active);
+        self.state.rho.copy_from_slice(&rho);
+        drop(rho);
+        let response = self.respond(penalty, monitor)?;
         let rho = &self.state.rho;
-        let volume: f64 = rho.iter().sum();
+        let frozen = self.active - rho.len() as f64;
+        let volume: f64 = frozen + rho.iter().sum::<f64>();
         let grayness = 4.0 * rho.iter().map(|r| r * (1.0 - r)).sum::<f64>() / self.active;
         let last = std::mem::replace(&mut self.state.compliance[1], response.compliance);
         if i == 0 {
@@ -288,7 +287,7 @@ impl<'a> Run<'a> {
         self.state.iteration = i + 1;
         let ended = self.state.quiet >= QUIET;
         if !ended {
-            self.update(&df, &dv, volume);
+            self.update(penalty, volume);
         }
         out.cases = response.cases;
         out.history.push(HistoryEntry {
@@ -306,78 +305,53 @@ impl<'a> Run<'a> {
     }
 
     /// Gradients of compliance and volume by the variables.
-    fn gradients(
-        &self,
-        fields: &Fields,
-        stiff: Option<Vec<f64>>,
-        penalty: f64,
-        energy: Vec<f64>,
-    ) -> (Vec<f64>, Vec<f64>) {
-        let rho = stiff.as_ref().unwrap_or(&self.state.rho);
+    fn gradients(&self, penalty: f64) -> (Vec<f64>, Vec<f64>) {
+        let eroded = self.chain.eroded(&self.fields);
+        let rho = eroded.as_ref().unwrap_or(&self.state.rho);
         let slope = -penalty * (1.0 - self.options.e_min) * self.problem.young;
-        let mut g = energy;
-        g.par_iter_mut()
-            .zip(rho)
-            .for_each(|(g, &rho)| *g *= slope * rho.powf(penalty - 1.0));
-        let df = self.at_design(&self.chain.gradient(fields, &g));
-        (df, self.at_design(&self.chain.volume_gradient(fields)))
-    }
-
-    /// Values of the variables on the grid: 1 where frozen, 0 outside.
-    fn on_grid(&self, x: &[f64]) -> Vec<f64> {
-        let frozen = |&l: &u8| f64::from(u8::from(l == FROZEN));
-        let mut out: Vec<f64> = self.problem.labels.iter().map(frozen).collect();
-        for (&v, &x) in self.design.iter().zip(x) {
-            out[v as usize] = x;
-        }
-        out
-    }
-
-    /// Values of the design voxels.
-    fn at_design(&self, field: &[f64]) -> Vec<f64> {
-        self.design.iter().map(|&v| field[v as usize]).collect()
+        let g = self.energy.par_iter().zip(rho);
+        let g = g.map(|(energy, rho)| energy * slope * rho.powf(penalty - 1.0));
+        let df = self.chain.gradient(&self.fields, g.collect());
+        (df, self.chain.volume_gradient(&self.fields))
     }
 
     /// New variables.
-    fn update(&mut self, df: &[f64], dv: &[f64], volume: f64) {
+    fn update(&mut self, penalty: f64, volume: f64) {
+        let (mut df, mut dv) = self.gradients(penalty);
         let step = self.options.limit();
-        let x = match self.options.update {
+        match self.options.update {
             UpdateKind::Oc => {
                 let room = self.target - volume;
-                oc::update(&self.state.x, df, dv, room, step)
+                let x = oc::update(&self.state.x, &df, &dv, room, step);
+                self.state.x.copy_from_slice(&x);
             }
             UpdateKind::Mma => {
-                let scale = 100.0 / self.state.compliance[0];
-                let df: Vec<f64> = df.iter().map(|d| d * scale).collect();
-                let dv: Vec<f64> = dv.iter().map(|d| d / self.target).collect();
+                scale(&mut df, 100.0 / self.state.compliance[0]);
+                scale(&mut dv, 1.0 / self.target);
                 let over = volume / self.target - 1.0;
-                self.state.mma.update(&self.state.x, &df, over, &dv, step)
+                let State { mma, x, .. } = &mut self.state;
+                mma.update(x, &df, over, &dv, step);
             }
-        };
-        let mut field = self.on_grid(&x);
-        self.chain.symmetry.copy(self.problem, &mut field);
-        self.state.x = self.at_design(&field);
+        }
+        self.chain.symmetry.copy(&mut self.state.x);
     }
 
-    /// Solves all load cases for the densities `stiff`, or else those of the state.
-    fn respond(
-        &mut self,
-        stiff: Option<&[f64]>,
-        penalty: f64,
-        monitor: &Monitor,
-    ) -> Result<Response, TopoptError> {
+    /// Solves all load cases.
+    fn respond(&mut self, penalty: f64, monitor: &Monitor) -> Result<Response, TopoptError> {
         let count = self.problem.cases.len();
         let moduli = |run: &Self, e_min| {
-            let rho = stiff.unwrap_or(&run.state.rho);
-            run.moduli(rho, penalty, e_min)
+            let eroded = run.chain.eroded(&run.fields);
+            run.moduli(eroded.as_ref().unwrap_or(&run.state.rho), penalty, e_min)
         };
-        self.solver.set_moduli(&moduli(self, self.options.e_min))?;
+        let first = moduli(self, self.options.e_min);
+        self.solver.set_moduli(&self.design, &first)?;
+        drop(first);
         let mut out = Response {
             cases: Vec::new(),
             compliance: 0.0,
-            energy: vec![0.0; self.problem.labels.len()],
             iterations: 0,
         };
+        self.energy.fill(0.0);
         let mut top = 0.0;
         let mut raised = false;
         while out.cases.len() < count {
@@ -397,9 +371,10 @@ impl<'a> Run<'a> {
                     }
                     self.fallbacks += 1;
                     self.solver.restart();
-                    self.solver.set_moduli(&moduli(self, RAISED_MIN))?;
+                    let raised = moduli(self, RAISED_MIN);
+                    self.solver.set_moduli(&self.design, &raised)?;
                     out.cases.clear();
-                    out.energy.fill(0.0);
+                    self.energy.fill(0.0);
                     top = 0.0;
                 }
                 Err(e) => return Err(e.into()),
@@ -411,7 +386,7 @@ impl<'a> Run<'a> {
             Objective::Weighted => weighted.iter().sum(),
             Objective::Worst => {
                 let norm = norm(&weighted);
-                scale(&mut out.energy, (top / norm).powf(NORM - 1.0));
+                scale(&mut self.energy, (top / norm).powf(NORM - 1.0));
                 norm
             }
         };
@@ -420,32 +395,25 @@ impl<'a> Run<'a> {
 
     /// Adds the case just solved. For the worst case energies are kept relative to `top`, the largest weighted compliance
     /// so far: the norm is known at the end only, and the displacements of one case at a time are in memory.
-    fn add(&self, case: usize, out: &mut Response, top: &mut f64) {
+    fn add(&mut self, case: usize, out: &mut Response, top: &mut f64) {
         let compliance = self.solver.compliance();
         let mut factor = self.problem.cases[case].weight;
         if self.options.objective == Objective::Worst {
             let weighted = factor * compliance;
             if weighted > *top {
-                scale(&mut out.energy, (*top / weighted).powf(NORM - 1.0));
+                scale(&mut self.energy, (*top / weighted).powf(NORM - 1.0));
                 *top = weighted;
             }
             factor *= (weighted / top.max(f64::MIN_POSITIVE)).powf(NORM - 1.0);
         }
         out.cases.push(compliance);
-        self.solver.add_energies(factor, &mut out.energy);
+        let solver = &self.solver;
+        solver.add_energies(factor, &self.design, &mut self.energy);
     }
 
     fn moduli(&self, rho: &[f64], penalty: f64, e_min: f64) -> Vec<f64> {
-        rho.par_iter()
-            .enumerate()
-            .map(|(v, &rho)| {
-                if self.problem.is_active(v) {
-                    self.problem.young * (e_min + rho.powf(penalty) * (1.0 - e_min))
-                } else {
-                    0.0
-                }
-            })
-            .collect()
+        let modulus = |rho: &f64| self.problem.young * (e_min + rho.powf(penalty) * (1.0 - e_min));
+        rho.par_iter().map(modulus).collect()
     }
 }
 

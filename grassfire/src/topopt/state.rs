@@ -15,7 +15,7 @@ pub struct State {
     pub iteration: usize,
     /// Variables, one a design voxel.
     pub x: Vec<f64>,
-    /// Densities of the last iteration.
+    /// Densities of the last iteration, one a design voxel.
     pub rho: Vec<f64>,
     /// Compliance of the first and of the last iteration.
     pub compliance: [f64; 2],
@@ -45,25 +45,24 @@ impl State {
         problem: &Problem,
         options: &OptimizeOptions,
     ) -> Result<(), IoError> {
-        let fields = [
-            &self.x,
-            &self.rho,
-            &self.mma.last,
-            &self.mma.before,
-            &self.mma.low,
-            &self.mma.high,
-        ];
+        let (steps, reach) = (&self.mma.steps, &self.mma.reach);
         let header = Header {
             problem: fingerprint(problem, options),
             iteration: self.iteration,
             compliance: self.compliance,
             quiet: self.quiet,
-            lengths: fields.iter().map(|f| f.len()).collect(),
+            lengths: vec![self.x.len(), self.rho.len(), reach.len(), steps.len()],
         };
         atomic_write(path, |out| {
             serde_json::to_writer(&mut *out, &header)?;
             out.write_all(b"\n")?;
-            for value in fields.into_iter().flatten() {
+            for value in self.x.iter().chain(&self.rho) {
+                out.write_all(&value.to_le_bytes())?;
+            }
+            for value in reach {
+                out.write_all(&value.to_le_bytes())?;
+            }
+            for value in steps {
                 out.write_all(&value.to_le_bytes())?;
             }
             Ok(())
@@ -93,41 +92,38 @@ impl State {
         if header.problem != fingerprint(problem, options) {
             return Err(bad("its voxels, loads or options differ"));
         }
-        let (n, all) = (problem.design().count(), problem.labels.len());
+        let n = problem.design().count();
         let data = &bytes[end + 1..];
-        let fits = header.lengths.len() == 6
-            && header.lengths[..2] == [n, all]
-            && header.lengths[2..].iter().all(|&l| l == 0 || l == n)
-            && data.len() == 8 * header.lengths.iter().sum::<usize>();
-        if !fits {
+        let fits = matches!(header.lengths[..], [x, rho, reach, steps]
+            if [x, rho] == [n, n] && reach == steps && (reach == 0 || reach == n));
+        let reach = header.lengths.get(2).copied().unwrap_or(0);
+        if !fits || data.len() != 16 * n + 5 * reach {
             return Err(bad("it is damaged"));
         }
-        let mut numbers = data.chunks_exact(8).map(|c| {
-            let mut b = [0; 8];
-            b.copy_from_slice(c);
-            f64::from_le_bytes(b)
-        });
-        let mut field = |i: usize| {
-            numbers
-                .by_ref()
-                .take(header.lengths[i])
-                .collect::<Vec<f64>>()
-        };
-        let state = Self {
+        let (variables, asymptotes) = data.split_at(16 * n);
+        let (reach, steps) = asymptotes.split_at(4 * reach);
+        let mut variables = variables
+            .as_chunks()
+            .0
+            .iter()
+            .map(|&b| f64::from_le_bytes(b));
+        Ok(Self {
             iteration: header.iteration,
             compliance: header.compliance,
             quiet: header.quiet,
-            x: field(0),
-            rho: field(1),
+            x: variables.by_ref().take(n).collect(),
+            rho: variables.collect(),
             mma: Mma {
-                last: field(2),
-                before: field(3),
-                low: field(4),
-                high: field(5),
+                steps: steps.iter().map(|&s| i8::from_le_bytes([s])).collect(),
+                reach: reach
+                    .as_chunks()
+                    .0
+                    .iter()
+                    .map(|&b| f32::from_le_bytes(b))
+                    .collect(),
                 ..Mma::default()
             },
-        };
-        Ok(state)
+        })
     }
 }
 

@@ -1,6 +1,7 @@
 //! Planes of symmetry of the design.
 
 use super::options::SymmetryPlane;
+use super::problem::DESIGN;
 use super::{Problem, TopoptError};
 
 /// Mirror images across the planes.
@@ -9,13 +10,15 @@ pub(super) struct Symmetry {
     dims: [usize; 3],
     /// Axis, and the sum of the indices of a voxel and its image.
     planes: Vec<(usize, usize)>,
+    /// Of every plane: numbers of design voxels and of their images, lower one first.
+    mirrored: Vec<Vec<[u32; 2]>>,
 }
 
 impl Symmetry {
     pub fn new(problem: &Problem, planes: &[SymmetryPlane]) -> Result<Self, TopoptError> {
         let mut out = Self {
             dims: problem.dims,
-            planes: Vec::new(),
+            ..Self::default()
         };
         for plane in planes {
             let axis = plane.axis();
@@ -33,10 +36,23 @@ impl Symmetry {
             }
             out.planes.push((axis, rounded as usize - 1));
         }
+        if out.planes.is_empty() {
+            return Ok(out);
+        }
+        let mut numbers = vec![0u32; problem.labels.len()];
+        for (number, v) in problem.design().enumerate() {
+            numbers[v] = number as u32;
+        }
+        let mirrored = |p| -> Vec<[u32; 2]> {
+            let pairs = out.pairs(p, problem);
+            let design = pairs.filter(|&(i, _)| problem.labels[i] == DESIGN);
+            design.map(|(i, j)| [numbers[i], numbers[j]]).collect()
+        };
+        out.mirrored = (0..out.planes.len()).map(mirrored).collect();
         Ok(out)
     }
 
-    /// Pairs of design voxels across plane `p`, lower index first.
+    /// Pairs of voxels with the same label across plane `p`, lower index first.
     fn pairs<'a>(
         &'a self,
         p: usize,
@@ -52,27 +68,24 @@ impl Symmetry {
         })
     }
 
-    /// Makes a field the mean of itself and its images.
-    pub fn average(&self, problem: &Problem, field: &mut [f64]) {
-        for p in 0..self.planes.len() {
-            for (i, j) in self.pairs(p, problem) {
-                let mean = 0.5 * (field[i] + field[j]);
-                field[i] = mean;
-                field[j] = mean;
-            }
+    /// Makes a field of the design voxels the mean of itself and its images.
+    pub fn average(&self, field: &mut [f64]) {
+        for &[i, j] in self.mirrored.iter().flatten() {
+            let (i, j) = (i as usize, j as usize);
+            let mean = 0.5 * (field[i] + field[j]);
+            field[i] = mean;
+            field[j] = mean;
         }
     }
 
-    /// Copies one side onto the others, so that a field is symmetric to the last bit.
-    pub fn copy(&self, problem: &Problem, field: &mut [f64]) {
-        for p in 0..self.planes.len() {
-            for (i, j) in self.pairs(p, problem) {
-                field[j] = field[i];
-            }
+    /// Copies one side of a field of the design voxels onto the others, so that it is symmetric to the last bit.
+    pub fn copy(&self, field: &mut [f64]) {
+        for &[i, j] in self.mirrored.iter().flatten() {
+            field[j as usize] = field[i as usize];
         }
     }
 
-    /// Largest difference between a field and its images, and the number of voxels without an image of the same label.
+    /// Largest difference between a field of the whole grid and its images, and the number of voxels without an image of the same label.
     pub fn error(&self, problem: &Problem, field: &[f64]) -> (f64, usize) {
         let mut worst: f64 = 0.0;
         let mut alone = 0;
