@@ -20,6 +20,8 @@ use crate::voxel::VoxelGrid;
 
 /// Density of the surface in `proposal_raw.stl`.
 const ISO: f64 = 0.5;
+/// The array of `density.vti` with the densities whose surface is the proposal.
+pub(super) const PROPOSAL: &str = "proposal";
 /// Density of dropped pieces of a part that is drawn.
 const BELOW: f32 = 0.49;
 /// Saved states.
@@ -248,16 +250,6 @@ fn write(
 ) -> Result<(), StageError> {
     let grid = |values| grid(problem, values);
     let density = grid(result.rho.iter().map(|&r| r as f32).collect());
-    let full = full(problem, result);
-    let label = grid(problem.labels.iter().map(|&l| f32::from(l)).collect());
-    io::write_vti(
-        &delivery.path("density.vti"),
-        &[("density", &density), ("full", &full), ("label", &label)],
-    )?;
-    let history = format!("{:#}\n", json!(result.history));
-    io::atomic_write(&delivery.path("history.json"), |out| {
-        out.write_all(history.as_bytes())
-    })?;
     let hull = Hull::of(problem, options)?;
     let draw = hull.as_ref().map(|hull| Draw {
         axis: hull.axis,
@@ -271,6 +263,21 @@ fn write(
         dropped,
         result,
     ));
+    let full = full(problem, result);
+    let label = grid(problem.labels.iter().map(|&l| f32::from(l)).collect());
+    io::write_vti(
+        &delivery.path("density.vti"),
+        &[
+            ("density", &density),
+            (PROPOSAL, &surface),
+            ("full", &full),
+            ("label", &label),
+        ],
+    )?;
+    let history = format!("{:#}\n", json!(result.history));
+    io::atomic_write(&delivery.path("history.json"), |out| {
+        out.write_all(history.as_bytes())
+    })?;
     let remesh = RemeshOptions::default();
     let mesh = match draw {
         Some(draw) => drawn_surface(&surface, ISO, draw, &remesh, monitor)?,

@@ -14,6 +14,7 @@ use super::{Outcome, ReconstructJob, exchange, finish, inputs, rebuild, tetrahed
 use crate::case::Case;
 use crate::io::{self, IoError};
 use crate::monitor::{Cancelled, Monitor};
+use crate::remesh::RemeshOptions;
 use crate::report::{InputFile, OptimizeBlock, Picture};
 use crate::verify::{VerifyOptions, check_options};
 use crate::voxel::VoxelGrid;
@@ -54,8 +55,8 @@ const LEFT: [&str; 3] = ["density.vti", "proposal_raw.stl", "history.json"];
 ///
 /// 1. The optimization: taken from an earlier run into the same folder when its inputs and options have not changed and
 ///    its files are still as they were (`cached` in the stages of the report).
-/// 2. Reconstruction of `proposal_raw.stl`, united with the exact non-design bodies of the project file. With a draw
-///    direction the mould of the finished part is looked at too.
+/// 2. Reconstruction of the densities, whose grid tells which holes are noise, united with the exact non-design bodies of
+///    the project file. With a draw direction the mould of the finished part is looked at too.
 /// 3. Verification of the finished part, and of the full voxels of the optimization for comparison.
 ///
 /// The report has the blocks of all of them; their stages keep their names.
@@ -155,8 +156,14 @@ fn reconstruction(job: &RunJob) -> ReconstructJob {
     if let (None, Some(draw)) = (options.mould.draw, &case.optimize.draw) {
         options.mould.draw = Some(draw.dir);
     }
+    options.read.field = Some(optimize::PROPOSAL.to_owned());
+    if options.remesh.min_tunnel == RemeshOptions::default().min_tunnel {
+        // The filter leaves no window narrower than its radius; what is narrower is the steps of a thin wall.
+        let filter = case.optimize.radius(case.grid.h);
+        options.remesh.min_tunnel = options.remesh.min_tunnel.min(filter);
+    }
     ReconstructJob {
-        part: job.output.join("proposal_raw.stl"),
+        part: job.output.join(LEFT[0]),
         bodies: case.non_design.clone(),
         folder: folder(job).to_owned(),
         output: job.output.clone(),
@@ -220,7 +227,12 @@ fn key(case: &Case, inputs: &[InputFile]) -> String {
     };
     // The first input is the project file itself, whose contents are in `own`.
     let files: Vec<&str> = inputs.iter().skip(1).map(|f| f.sha256.as_str()).collect();
-    let text = json!({ "version": env!("CARGO_PKG_VERSION"), "case": own, "files": files });
+    let text = json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "part": optimize::PROPOSAL,
+        "case": own,
+        "files": files,
+    });
     inputs::hash(text.to_string().as_bytes())
 }
 
