@@ -101,6 +101,8 @@ fn reconstruct_help_is_complete() {
           --faces <MODE>         How quads are put together to faces (brep.faces) [possible values:
                                  exact, fewest, quads]
           --voxel <MM>           Edge of a voxel, mm (remesh.voxel)
+          --crease-angle <DEG>   Flat faces whose border turns by at least this become exactly plane
+                                 with sharp edges, degrees (flats.crease_angle)
           --quad-size <MM>       Edge of a skeleton quad, mm (skeleton.quad_size)
           --iso <VALUE>          Density at which material begins (read.threshold)
           --format <FORMAT>      Files to write besides part.step and part.stl; may be repeated or a

@@ -27,7 +27,7 @@ pub struct Boss {
     pub outer_radius: f64,
     /// The sleeve's ends, mm along `direction` from `origin`.
     pub extent: [f64; 2],
-    /// Where the material ends before the outer wall; turns begin at [`across`] of `direction`.
+    /// Where the material ends before the outer wall; turns begin at `cad::primitives::across` of `direction`.
     pub notches: Vec<Notch>,
     /// How far the hole goes on free of material beyond its ends, mm; at most one radius is looked at.
     pub free: f64,

@@ -20,7 +20,7 @@ use crate::voxel::VoxelGrid;
 
 /// Density of the surface in `proposal_raw.stl`.
 const ISO: f64 = 0.5;
-/// The array of `density.vti` with the densities whose surface is the proposal.
+/// The array of `density.vti` whose surface is the proposal, without the steps of the voxels.
 pub(super) const PROPOSAL: &str = "proposal";
 /// Density of dropped pieces of a part that is drawn.
 const BELOW: f32 = 0.49;
@@ -263,13 +263,15 @@ fn write(
         dropped,
         result,
     ));
+    let smooth: Vec<f32> = result.smooth.iter().map(|&r| r as f32).collect();
+    let smooth = grid(surface_field(problem.dims, &smooth, dropped, result));
     let full = full(problem, result);
     let label = grid(problem.labels.iter().map(|&l| f32::from(l)).collect());
     io::write_vti(
         &delivery.path("density.vti"),
         &[
             ("density", &density),
-            (PROPOSAL, &surface),
+            (PROPOSAL, &smooth),
             ("full", &full),
             ("label", &label),
         ],

@@ -45,7 +45,8 @@ pub(super) fn recognise(
         return Ok(Found::default());
     }
     let Proposal::Mesh { mesh, .. } = proposal else {
-        if mode == RecogniseMode::Auto || job.design_space.is_some() || creased {
+        let given = !job.non_design.is_empty() || !job.bodies.is_empty();
+        if mode == RecogniseMode::Auto && !given || job.design_space.is_some() || creased {
             monitor.warn(
                 STAGE,
                 "non-design bodies and flat faces are recognised in meshes only, not in densities",

@@ -46,6 +46,13 @@ pub const ALL: &[Paper] = &[
         used_for: "planes and cylinders in the proposal",
     },
     Paper {
+        key: "lorensen1987",
+        citation: "W. E. Lorensen, H. E. Cline (1987): Marching cubes: a high resolution 3D surface construction algorithm. ACM SIGGRAPH Computer Graphics 21(4).",
+        doi: "10.1145/37402.37422",
+        stages: &["optimize"],
+        used_for: "the raw proposal of a drawn part",
+    },
+    Paper {
         key: "zhao2005",
         citation: "H. Zhao (2005): A fast sweeping method for Eikonal equations. Mathematics of Computation 74.",
         doi: "10.1090/S0025-5718-04-01678-3",

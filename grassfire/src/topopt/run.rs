@@ -49,6 +49,8 @@ pub struct HistoryEntry {
 pub struct Optimized {
     /// Densities, `[z][y][x]`.
     pub rho: Vec<f64>,
+    /// The field whose surface at 0.5 is that of the part without the steps of the voxels, `[z][y][x]`.
+    pub smooth: Vec<f64>,
     /// Full and empty voxels.
     pub binary: Binary,
     /// All iterations.
@@ -127,10 +129,18 @@ pub fn optimize(
         state,
         target,
         fallbacks,
+        fields,
         ..
     } = run;
     drop(solver);
     out.rho = problem.on_grid(&state.rho, 1.0);
+    let smooth = chain.smooth(&fields);
+    out.smooth = if smooth.is_empty() {
+        // A saved state that had ended.
+        out.rho.clone()
+    } else {
+        problem.on_grid(&smooth, 1.0)
+    };
     out.binary = binary(problem, &chain, &out.rho, target);
     out.symmetry_error = chain.symmetry.error(problem, &out.rho).0;
     out.fallbacks = fallbacks;
