@@ -67,3 +67,24 @@ pub use {
 fn array(v: crate::Vec3) -> [f64; 3] {
     v.into()
 }
+
+/// The prism from a convex polygon to the same polygon moved by `way`, from where it is seen counter-clockwise.
+#[cfg(feature = "occt")]
+fn prism(
+    polygon: &[crate::Vec3],
+    way: crate::Vec3,
+) -> Result<grassfire_occt::Shape, grassfire_occt::OcctError> {
+    let n = polygon.len() as u32;
+    let feet = polygon.iter().map(|p| array(*p));
+    let heads = polygon.iter().map(|p| array(p + way));
+    let points: Vec<[f64; 3]> = feet.chain(heads).collect();
+    let mut triangles = Vec::with_capacity(4 * polygon.len());
+    for k in 0..n {
+        let next = (k + 1) % n;
+        triangles.extend([[k, next, n + next], [k, n + next, n + k]]);
+    }
+    for k in 2..n {
+        triangles.extend([[0, k, k - 1], [n, n + k - 1, n + k]]);
+    }
+    grassfire_occt::Shape::from_triangles(&points, &triangles)?.unified()
+}

@@ -5,7 +5,7 @@ use std::path::Path;
 use grassfire_occt::{OcctError, Operation, Shape, Surface};
 
 use super::bores::{self, Bore};
-use super::{CadError, NonDesignOptions, array, primitives, rebuild};
+use super::{CadError, NonDesignOptions, array, primitives, prism, rebuild};
 use crate::Vec3;
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
@@ -51,12 +51,6 @@ pub struct NonDesignBody {
 
 const STAGE: &str = "cad";
 const VOLUME_EPS: f64 = 1e-9;
-/// Triangles of a block whose corner k has the bits of k as its coordinates.
-#[rustfmt::skip]
-const PRISM: [[u32; 3]; 12] = [
-    [0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4],
-    [2, 6, 7], [2, 7, 3], [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5],
-];
 
 /// The solids of a STEP file, at least one.
 fn read_solids(path: &Path) -> Result<Vec<Shape>, CadError> {
@@ -201,15 +195,13 @@ fn notch_tool(boss: &Boss, notch: &Notch) -> Result<Shape, CadError> {
     let aside = boss.direction.cross(&away);
     let length = boss.extent[1] - boss.extent[0];
     let far = 2.0 * boss.outer_radius;
-    let corner = |k: usize| {
-        let distance = if k & 1 == 0 { notch.distance } else { far };
-        let side = distance * notch.half_angle.tan();
-        let side = if k & 2 == 0 { -side } else { side };
-        let height = boss.extent[k >> 2] + if k & 4 == 0 { -length } else { length };
-        array(boss.origin + away * distance + aside * side + boss.direction * height)
+    let foot = boss.origin + boss.direction * (boss.extent[0] - length);
+    let corner = |(distance, sign): (f64, f64)| {
+        foot + away * distance + aside * (sign * distance * notch.half_angle.tan())
     };
-    let points: Vec<[f64; 3]> = (0..8).map(corner).collect();
-    Ok(Shape::from_triangles(&points, &PRISM)?.unified()?)
+    let near = notch.distance;
+    let corners = [(near, -1.0), (far, -1.0), (far, 1.0), (near, 1.0)].map(corner);
+    Ok(prism(&corners, boss.direction * (3.0 * length))?)
 }
 
 /// A design space: its faces as triangles, its solids, its bores.

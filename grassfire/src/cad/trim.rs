@@ -7,7 +7,7 @@ use grassfire_occt::{BooleanResult, OcctError, Operation, Origin, Shape};
 use super::build::{CadSolid, FaceSource, IDENTITY, VOLUME_EPS, single};
 use super::inspect;
 use super::non_design::NonDesignBody;
-use super::{CadError, CadOptions, array};
+use super::{CadError, CadOptions, prism};
 use crate::monitor::Monitor;
 use crate::non_design::Flat;
 
@@ -82,7 +82,7 @@ impl Trimmed {
         monitor: &Monitor,
     ) -> Result<Self, String> {
         let text = |e: OcctError| e.0;
-        let tool = prism(flat, height).map_err(text)?;
+        let tool = prism(&flat.outline, flat.normal * height).map_err(text)?;
         let cut = |fuzzy: f64| self.cut(&tool, fuzzy, options, monitor);
         let BooleanResult {
             shape,
@@ -127,9 +127,7 @@ impl Trimmed {
             ..*self
         })
     }
-}
 
-impl Trimmed {
     fn cut(
         &self,
         tool: &Shape,
@@ -149,22 +147,4 @@ impl Trimmed {
             None => Ok(result),
         }
     }
-}
-
-/// The space over a flat's outline.
-fn prism(flat: &Flat, height: f64) -> Result<Shape, OcctError> {
-    let n = flat.outline.len() as u32;
-    let up = flat.normal * height;
-    let feet = flat.outline.iter().map(|p| array(*p));
-    let heads = flat.outline.iter().map(|p| array(p + up));
-    let points: Vec<[f64; 3]> = feet.chain(heads).collect();
-    let mut triangles = Vec::with_capacity(4 * n as usize - 4);
-    for k in 0..n {
-        let next = (k + 1) % n;
-        triangles.extend([[k, next, n + next], [k, n + next, n + k]]);
-    }
-    for k in 1..n - 1 {
-        triangles.extend([[0, k + 1, k], [n, n + k, n + k + 1]]);
-    }
-    Shape::from_triangles(&points, &triangles)?.unified()
 }

@@ -21,12 +21,10 @@ const ALONG: [f64; 2] = [0.3, 0.8];
 /// `field` is the signed distance to the proposal, mm, positive inside. It changes only close to a face, and where its surface
 /// runs along it: where non-design bodies were cut out nothing grows into them. Inside, the rise fades slowly, because a jump
 /// there would lead samples of the body to the wrong wall. The result is for fitting only and does not depend on the number
-/// of threads.
-pub fn raised(field: &VoxelGrid<f32>, flats: &Flats, rise: f64) -> VoxelGrid<f32> {
+/// of threads. None when there is no face.
+pub fn raised(field: &VoxelGrid<f32>, flats: &Flats, rise: f64) -> Option<VoxelGrid<f32>> {
     let bvh = Bvh::new(&flats.surface);
-    let (Some((lo, hi)), true) = (bvh.bounds(), rise > 0.0) else {
-        return field.clone();
-    };
+    let (lo, hi) = bvh.bounds().filter(|_| rise > 0.0)?;
     let voxel = field.spacing;
     let reach = rise + REACH * voxel;
     let near = |p: &Vec3| (0..3).all(|a| lo[a] - reach <= p[a] && p[a] <= hi[a] + reach);
@@ -51,10 +49,10 @@ pub fn raised(field: &VoxelGrid<f32>, flats: &Flats, rise: f64) -> VoxelGrid<f32
         let below = (1.0 + height / (DEPTH * voxel)).clamp(0.0, 1.0);
         (f64::from(f) + rise * along * around * below) as f32
     };
-    VoxelGrid {
+    Some(VoxelGrid {
         values: field.values.par_iter().enumerate().map(value).collect(),
         ..field.clone()
-    }
+    })
 }
 
 #[cfg(test)]
@@ -86,13 +84,21 @@ mod tests {
             tags: vec![0, 0],
         };
         let faces = vec![face];
-        (field, Flats { faces, surface })
+        let tolerance = 0.0;
+        (
+            field,
+            Flats {
+                faces,
+                surface,
+                tolerance,
+            },
+        )
     }
 
     #[test]
     fn the_surface_bulges_over_the_face_and_nowhere_else() {
         let (field, flats) = half_space();
-        let raised = raised(&field, &flats, 0.5);
+        let raised = raised(&field, &flats, 0.5).expect("a face");
         for (p, surface) in [
             (Vec3::new(0.0, 0.0, 0.5), true),
             (Vec3::new(4.5, -4.5, 0.5), true),
@@ -106,7 +112,7 @@ mod tests {
     #[test]
     fn a_jump_inside_led_the_body_to_the_wrong_wall() {
         let (field, flats) = half_space();
-        let raised = raised(&field, &flats, 0.5);
+        let raised = raised(&field, &flats, 0.5).expect("a face");
         for step in -15..10 {
             let at = |s: i32| raised.sample(&Vec3::new(0.5, 0.5, 0.2 * f64::from(s)));
             assert!(at(step) - at(step + 1) > 0.05, "height {step}");

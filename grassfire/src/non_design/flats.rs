@@ -31,6 +31,8 @@ pub struct Flats {
     pub faces: Vec<Flat>,
     /// Triangles of those that are made plane; the tag is the number of the face.
     pub surface: TriMesh,
+    /// A boss or a body ends on a face when it does within this, mm.
+    pub tolerance: f64,
 }
 
 /// Sides of the outline: halves of right angles.
@@ -39,6 +41,8 @@ const SIDES: usize = 8;
 const MARGIN: f64 = 1.5;
 /// Normals with this cosine are parallel but for the noise of a mesh: 0.5 degrees.
 const PARALLEL: f64 = 0.999_96;
+/// A boss or a body ends on a face when it does within this many voxels.
+const SAME_PLANE: f64 = 0.05;
 /// Material beside a face counts as standing on it when it is higher than this, voxels.
 const STANDS: f64 = 0.5;
 
@@ -55,7 +59,10 @@ pub fn flats(mesh: &TriMesh, candidates: &[Candidate], voxel: f64, options: &Fla
         return Flats::default();
     };
     let facets = Facets::new(mesh);
-    let mut out = Flats::default();
+    let mut out = Flats {
+        tolerance: SAME_PLANE * voxel,
+        ..Flats::default()
+    };
     for candidate in candidates {
         let Primitive::Plane { normal, offset } = candidate.surface else {
             continue;
@@ -135,7 +142,8 @@ fn outline(points: &[Vec3], normal: &Vec3, offset: f64, margin: f64) -> Vec<Vec3
 impl Flats {
     /// Lets faces that lie on a plane face of the given bodies lie on it exactly: a cut that is off by a few millionths would
     /// leave slivers. `surface` are triangles of the bodies.
-    pub fn adopt_planes(&mut self, surface: &TriMesh, tolerance: f64) {
+    pub fn adopt_planes(&mut self, surface: &TriMesh) {
+        let tolerance = self.tolerance;
         for flat in &mut self.faces {
             let own = (0..surface.triangles.len()).filter_map(|t| {
                 let corners = surface.corners(t);
@@ -158,13 +166,13 @@ impl Flats {
     }
 
     /// Lets a recognised boss end exactly on the faces that it nearly ends on, its axis across the larger one.
-    pub fn end_on(&self, boss: &mut Boss, tolerance: f64) {
+    pub fn end_on(&self, boss: &mut Boss) {
         let free = || self.faces.iter().filter(|flat| flat.reason.is_none());
         let ends = |boss: &Boss, flat: &&Flat, end: usize| {
             let p = boss.origin + boss.direction * boss.extent[end];
             let sign = if end == 0 { -1.0 } else { 1.0 };
             boss.direction.dot(&flat.normal) * sign > PARALLEL
-                && flat.height(&p).abs() <= tolerance
+                && flat.height(&p).abs() <= self.tolerance
                 && flat.covers(&p)
         };
         // The faces are sorted, the largest first.
@@ -346,7 +354,7 @@ mod tests {
             free: 2.0,
             residual: 0.0,
         };
-        flats.end_on(&mut boss, 0.05);
+        flats.end_on(&mut boss);
         let end = |k: usize| boss.origin + boss.direction * boss.extent[k];
         assert!((boss.direction + Vec3::z()).norm() < 1e-9, "{boss:?}");
         assert!((end(0).z - 12.0).abs() < 1e-9 && end(1).z.abs() < 1e-9);
@@ -363,7 +371,7 @@ mod tests {
             triangles: vec![[0, 1, 2]],
             tags: Vec::new(),
         };
-        flats.adopt_planes(&below, 0.05);
+        flats.adopt_planes(&below);
         let bottom = flats.faces.iter().find(|f| f.normal.z < -0.9);
         let bottom = bottom.expect("a bottom");
         assert!(points.iter().all(|p| bottom.height(p).abs() < 1e-12));

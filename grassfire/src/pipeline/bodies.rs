@@ -115,7 +115,7 @@ impl Bodies {
         for (flat, block) in self.flats.faces.iter_mut().zip(blocks) {
             flat.reason.clone_from(&block.reason);
         }
-        let Flats { faces, surface } = &mut self.flats;
+        let Flats { faces, surface, .. } = &mut self.flats;
         let keep = |t: &usize| faces[surface.tags[*t] as usize].reason.is_none();
         let kept: Vec<usize> = (0..surface.triangles.len()).filter(keep).collect();
         surface.triangles = kept.iter().map(|&t| surface.triangles[t]).collect();
@@ -125,7 +125,7 @@ impl Bodies {
 
     /// Gives up all flat faces that are left.
     pub(super) fn refuse_all_flats(&mut self, reason: &str) {
-        let Flats { faces, surface } = &mut self.flats;
+        let Flats { faces, surface, .. } = &mut self.flats;
         for flat in faces.iter_mut().filter(|flat| flat.reason.is_none()) {
             flat.reason = Some(reason.to_owned());
         }

@@ -147,10 +147,10 @@ impl<'a> Site<'a> {
             delivery.stl("design_part.stl", part.solid.mesh())
         })?;
         let rise = options.flats.raise * remeshed.field.spacing;
-        let target = raised(&part.field, &self.bodies.flats, rise);
+        let raised = raised(&part.field, &self.bodies.flats, rise);
         let base = Base {
             remeshed: &part,
-            target: &target,
+            target: raised.as_ref().unwrap_or(&part.field),
             united: Some(wanted),
             lost,
         };
@@ -238,7 +238,7 @@ impl<'a> Site<'a> {
                 clear_of(&remeshed.field, &bodies.bosses, depth)
             };
             let rise = options.flats.raise * voxel;
-            Ok::<_, StageError>(raised(&clear, &bodies.flats, rise))
+            Ok::<_, StageError>(raised(&clear, &bodies.flats, rise).unwrap_or(clear))
         })?;
         let base = Base {
             remeshed,

@@ -14,8 +14,6 @@ use crate::remesh::default_voxel;
 use crate::report::{CandidateBlock, DesignFaceBlock};
 
 const STAGE: &str = "recognise";
-/// A boss or a body ends on a flat face when it does within this many voxels.
-const SAME_PLANE: f64 = 0.05;
 /// A hollow that turns by more than this is worth a word why it is no boss, radians.
 const HALF_TURN: f64 = std::f64::consts::PI;
 
@@ -58,11 +56,9 @@ pub(super) fn recognise(
     let unite = mode == RecogniseMode::Auto && job.non_design.is_empty() && job.bodies.is_empty();
     let mut found = Found::default();
     let mut bosses = recognised.bosses.clone();
-    bodies.flats = flat_faces(mesh, &recognised, options, monitor);
-    let tolerance = SAME_PLANE * voxel(mesh, options);
-    bodies.flats.adopt_planes(&bodies.surface, tolerance);
+    bodies.flats = flat_faces(mesh, &recognised, &bodies.surface, options, monitor);
     for boss in &mut bosses {
-        bodies.flats.end_on(boss, tolerance);
+        bodies.flats.end_on(boss);
     }
     if let Some(path) = &job.design_space {
         let space = design_space(path, mesh, options, monitor)?;
@@ -83,10 +79,12 @@ pub(super) fn recognise(
     Ok(found)
 }
 
-/// The flat faces that become exactly plane; none where an edit moves the surface.
+/// The flat faces that become exactly plane, those on the `given` bodies' planes exactly there; none where an edit moves the
+/// surface.
 fn flat_faces(
     mesh: &TriMesh,
     recognised: &Recognised,
+    given: &TriMesh,
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Flats {
@@ -101,7 +99,9 @@ fn flat_faces(
         return Flats::default();
     }
     let voxel = voxel(mesh, options);
-    non_design::flats(mesh, &recognised.candidates, voxel, &options.flats)
+    let mut flats = non_design::flats(mesh, &recognised.candidates, voxel, &options.flats);
+    flats.adopt_planes(given);
+    flats
 }
 
 fn voxel(mesh: &TriMesh, options: &ReconstructOptions) -> f64 {
