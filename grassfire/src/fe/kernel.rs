@@ -9,11 +9,11 @@ use super::matrix_free::Float;
 use super::window::Window;
 
 /// One plane of `y = K u`: gathers the eight elements around every node.
-pub(super) struct Plane<'a, T> {
+pub(super) struct Plane<'a, T, U> {
     pub grid: &'a NodeGrid,
     pub z: usize,
     /// Node field.
-    pub u: &'a [T],
+    pub u: &'a [U],
     /// Field of elements: modulus times edge.
     pub e: &'a [f64],
     /// Stiffness of the unit element, row by row.
@@ -76,7 +76,7 @@ macro_rules! all_nodes {
 
 macro_rules! plane_kernel {
     ($float:ty, $view:ident, $store:ident, $splat:ident, $mul_add:ident) => {
-        impl WithSimd for Plane<'_, $float> {
+        impl<U: Copy + Into<$float>> WithSimd for Plane<'_, $float, U> {
             type Output = ();
 
             #[inline(always)]
@@ -87,7 +87,7 @@ macro_rules! plane_kernel {
                     if runs.is_empty() {
                         continue;
                     }
-                    self.near.load(grid, self.u, |v| v, y, z);
+                    self.near.load(grid, self.u, U::into, y, z);
                     self.around.load(grid, self.e, <$float>::of, y, z);
                     for &run in runs {
                         let row = Row {

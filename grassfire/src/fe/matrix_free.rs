@@ -1,6 +1,6 @@
 //! The operator of the finest grid, without a matrix.
 
-use pulp::{Arch, WithSimd};
+use pulp::Arch;
 use rayon::prelude::*;
 
 use super::grid::NodeGrid;
@@ -12,15 +12,15 @@ pub(super) trait Float:
     Copy + Default + PartialEq + PartialOrd + Send + Sync + Into<f64> + 'static
 {
     fn of(value: f64) -> Self;
-    /// One plane of the product.
-    fn plane(arch: Arch, plane: Plane<'_, Self>);
+    /// One plane of the product with a field of numbers that need not be as precise.
+    fn plane<U: Copy + Into<Self>>(arch: Arch, plane: Plane<'_, Self, U>);
 }
 
 impl Float for f32 {
     fn of(value: f64) -> Self {
         value as f32
     }
-    fn plane(arch: Arch, plane: Plane<'_, Self>) {
+    fn plane<U: Copy + Into<Self>>(arch: Arch, plane: Plane<'_, Self, U>) {
         arch.dispatch(plane);
     }
 }
@@ -29,7 +29,7 @@ impl Float for f64 {
     fn of(value: f64) -> Self {
         value
     }
-    fn plane(arch: Arch, plane: Plane<'_, Self>) {
+    fn plane<U: Copy + Into<Self>>(arch: Arch, plane: Plane<'_, Self, U>) {
         arch.dispatch(plane);
     }
 }
@@ -40,10 +40,7 @@ pub(super) struct MatrixFree<T> {
     arch: Arch,
 }
 
-impl<T: Float> MatrixFree<T>
-where
-    for<'a> Plane<'a, T>: WithSimd<Output = ()>,
-{
+impl<T: Float> MatrixFree<T> {
     pub fn new(stiffness: &[[f64; 24]; 24]) -> Self {
         Self {
             k: Box::new(std::array::from_fn(|i| T::of(stiffness[i / 24][i % 24]))),
@@ -52,7 +49,14 @@ where
     }
 
     /// `y = K u`; the places `fixed` of y are zero. `e`: field of elements, modulus times edge.
-    pub fn apply(&self, grid: &NodeGrid, e: &[f64], fixed: &[usize], u: &[T], y: &mut [T]) {
+    pub fn apply<U: Copy + Into<T> + Sync>(
+        &self,
+        grid: &NodeGrid,
+        e: &[f64],
+        fixed: &[usize],
+        u: &[U],
+        y: &mut [T],
+    ) {
         let windows = || (Window::new(grid, 3), Window::new(grid, 1));
         grid.planes(3, y)
             .enumerate()

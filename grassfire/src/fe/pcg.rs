@@ -20,7 +20,9 @@ pub struct SolveStats {
 
 /// Solves `K u = b` from the given u. `b`: (place, value) pairs, none at a fixed place.
 ///
-/// The three vectors of the iteration live as long as the solution: others need the memory in between.
+/// The three vectors of the iteration live as long as the solution: others need the memory in between. Search directions are
+/// rounded to single precision: displacements and residual both move along the rounded one, so that they stay true to each
+/// other.
 pub(super) fn solve(
     fine: Fine,
     operator: &MatrixFree<f64>,
@@ -31,10 +33,10 @@ pub(super) fn solve(
     monitor: &Monitor,
 ) -> Result<SolveStats, Cancelled> {
     let grid = &fine.frame.grid;
-    let apply = |x: &[f64], y: &mut [f64]| operator.apply(grid, fine.e, &fine.frame.fixed, x, y);
-    let (mut r, mut p, mut q) = (grid.field(), grid.field(), grid.field());
+    let fixed = &fine.frame.fixed;
+    let (mut r, mut p, mut q) = (grid.field(), grid.field::<f32>(), grid.field());
     let size = b.iter().map(|(_, v)| v * v).sum::<f64>().sqrt();
-    apply(u, &mut q);
+    operator.apply(grid, fine.e, fixed, &*u, &mut q);
     r.par_iter_mut()
         .zip(&q)
         .for_each(|(r, q): (&mut f64, &f64)| *r = -q);
@@ -59,13 +61,17 @@ pub(super) fn solve(
             .for_each(|(p, z)| {
                 p.iter_mut()
                     .zip(z)
-                    .for_each(|(p, &z)| *p = f64::from(z) + beta * *p)
+                    .for_each(|(p, &z)| *p = (f64::from(z) + beta * f64::from(*p)) as f32)
             });
-        apply(&p, &mut q);
+        operator.apply(grid, fine.e, fixed, &p, &mut q);
         let alpha = rz / dot(&p, &q);
         u.par_chunks_mut(PIECE)
             .zip(p.par_chunks(PIECE))
-            .for_each(|(u, p)| u.iter_mut().zip(p).for_each(|(u, p)| *u += alpha * p));
+            .for_each(|(u, p)| {
+                u.iter_mut()
+                    .zip(p)
+                    .for_each(|(u, &p)| *u += alpha * f64::from(p))
+            });
         r.par_chunks_mut(PIECE)
             .zip(q.par_chunks(PIECE))
             .for_each(|(r, q)| r.iter_mut().zip(q).for_each(|(r, q)| *r -= alpha * q));

@@ -37,9 +37,9 @@ const SHARE: usize = 80;
 pub fn memory_estimate(voxels: f64, cases: usize) -> f64 {
     // A node more than voxels each way, and short rows: a tenth more nodes.
     let nodes = 1.1 * voxels + 1e4;
-    // Single: b, x, d, t, the diagonal, u of every case but one. Double: r, p, q, u, moduli.
+    // Single: b, x, d, t, p, the diagonal, u of every case but one. Double: r, q, u, moduli.
     let starts = 3.0 * cases.saturating_sub(1) as f64;
-    let fine = 4.0 * (4.0 * 3.0 + 1.0 + starts) + 8.0 * (4.0 * 3.0 + 1.0);
+    let fine = 4.0 * (5.0 * 3.0 + 1.0 + starts) + 8.0 * (3.0 * 3.0 + 1.0);
     // Coarse levels: 1/7 of stencil and fields, a quarter more nodes at their borders.
     nodes * fine + voxels * 1.25 * (243.0 + 18.0) * 4.0 / 7.0
 }
