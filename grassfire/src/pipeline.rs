@@ -18,6 +18,7 @@ mod illustrate;
 mod inputs;
 mod measure;
 mod optimize;
+mod proposal;
 mod recognise;
 mod record;
 mod run;

@@ -6,11 +6,11 @@ use serde_json::json;
 
 use super::deliver::Delivery;
 use super::error::{PipelineError, StageError};
+use super::proposal::{self, ISO, kept};
 use super::record::Record;
 use super::{Outcome, finish, inputs};
 use crate::Vec3;
 use crate::case::{self, Built, Case, Shape};
-use crate::fe::components;
 use crate::io;
 use crate::monitor::{Cancelled, Monitor};
 use crate::remesh::{Draw, RemeshOptions, drawn_surface, iso_surface};
@@ -18,10 +18,9 @@ use crate::report::{InputFile, OptimizeBlock};
 use crate::topopt::{self, Hull, OptimizeOptions, Optimized, Problem, State, TopoptError};
 use crate::voxel::VoxelGrid;
 
-/// Density of the surface in `proposal_raw.stl`.
-const ISO: f64 = 0.5;
-/// The array of `density.vti` whose surface is the proposal, without the steps of the voxels.
-pub(super) const PROPOSAL: &str = "proposal";
+/// The field whose surface is the proposal, without the steps of the voxels, and its array.
+pub(super) const PROPOSAL: &str = "proposal.vti";
+pub(super) const ARRAY: &str = "proposal";
 /// Density of dropped pieces of a part that is drawn.
 const BELOW: f32 = 0.49;
 /// Saved states.
@@ -29,6 +28,10 @@ const STATE: &str = "optimize.state";
 /// Files that `optimize` writes.
 pub(super) const FILES: &[(&str, &str)] = &[
     ("density.vti", "densities of the optimization"),
+    (
+        PROPOSAL,
+        "the optimized part without the steps of its voxels: its surface is at 0.5",
+    ),
     (
         "proposal_raw.stl",
         "optimized part: the surface of density 0.5, with the non-design bodies",
@@ -255,27 +258,17 @@ fn write(
         axis: hull.axis,
         parting: hull.parting(),
     });
+    let full = full(problem, result);
     // Capped below the surface, columns of a draw still fall away from the parting.
     let dropped = if draw.is_some() { BELOW } else { 0.0 };
-    let surface = grid(surface_field(
-        problem.dims,
-        &density.values,
-        dropped,
-        result,
-    ));
-    let smooth: Vec<f32> = result.smooth.iter().map(|&r| r as f32).collect();
-    let smooth = grid(surface_field(problem.dims, &smooth, dropped, result));
-    let full = full(problem, result);
+    let surface = grid(kept(&density.values, &full, dropped));
+    let smooth = proposal::field(problem, &result.smooth, &full, dropped, monitor)?;
     let label = grid(problem.labels.iter().map(|&l| f32::from(l)).collect());
     io::write_vti(
         &delivery.path("density.vti"),
-        &[
-            ("density", &density),
-            (PROPOSAL, &smooth),
-            ("full", &full),
-            ("label", &label),
-        ],
+        &[("density", &density), ("full", &full), ("label", &label)],
     )?;
+    io::write_vti(&delivery.path(PROPOSAL), &[(ARRAY, &smooth)])?;
     let history = format!("{:#}\n", json!(result.history));
     io::atomic_write(&delivery.path("history.json"), |out| {
         out.write_all(history.as_bytes())
@@ -287,21 +280,4 @@ fn write(
     };
     delivery.stl("proposal_raw.stl", &mesh)?;
     Ok(())
-}
-
-/// Densities whose surface is wanted: in pieces that were dropped at most `dropped`.
-fn surface_field(dims: [usize; 3], rho: &[f32], dropped: f32, result: &Optimized) -> Vec<f32> {
-    let above: Vec<bool> = rho.iter().map(|&r| f64::from(r) > ISO).collect();
-    let (labels, pieces) = components(dims, &above);
-    let mut keep = vec![false; pieces.len()];
-    for (v, _) in result.binary.solid.iter().enumerate().filter(|(_, s)| **s) {
-        if let Some(keep) = keep.get_mut(labels[v] as usize) {
-            *keep = true;
-        }
-    }
-    let part = |(v, &r): (usize, &f32)| match keep.get(labels[v] as usize) {
-        Some(false) => r.min(dropped),
-        _ => r,
-    };
-    rho.iter().enumerate().map(part).collect()
 }

@@ -16,7 +16,8 @@ use crate::io::{self, IoError};
 use crate::monitor::{Cancelled, Monitor};
 use crate::remesh::RemeshOptions;
 use crate::report::{InputFile, OptimizeBlock, Picture};
-use crate::verify::{VerifyOptions, check_options};
+use crate::topopt;
+use crate::verify::{Verified, VerifyOptions, check_options};
 use crate::voxel::VoxelGrid;
 
 /// Where a run ends.
@@ -49,7 +50,12 @@ pub struct RunJob {
 /// What an earlier optimization was made from, and what it left.
 const CACHE: &str = "optimize.cache.json";
 /// The files that an optimization leaves.
-const LEFT: [&str; 3] = ["density.vti", "proposal_raw.stl", "history.json"];
+const LEFT: [&str; 4] = [
+    "density.vti",
+    optimize::PROPOSAL,
+    "proposal_raw.stl",
+    "history.json",
+];
 
 /// Optimizes, reconstructs and verifies a project file.
 ///
@@ -81,7 +87,8 @@ pub fn run(job: &RunJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
             Ok(outcome)
         };
     }
-    let rebuilt = rebuild(&mut record, &reconstruction(job), monitor)?;
+    let grid = record.report.optimize.as_ref().map_or([0; 3], |o| o.grid);
+    let rebuilt = rebuild(&mut record, &reconstruction(job, grid), monitor)?;
     record.report.inputs = read;
     let mut pictures: Vec<Picture> = rebuilt.pictures;
     if job.to == Stage::Reconstruct {
@@ -100,6 +107,7 @@ pub fn run(job: &RunJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
             return Ok(outcome);
         }
     };
+    warn_steps(&record, &found, monitor);
     record.stage("write", || verify::result(&delivery, &found))?;
     let part = job.output.join("part.step");
     if let Err(error) = tetrahedra::prove(
@@ -118,6 +126,26 @@ pub fn run(job: &RunJob, monitor: &Monitor) -> Result<Outcome, PipelineError> {
     }
     pictures.extend(record.stage("pictures", || verify::pictures(&found, mesh, options))?);
     finish(record, &delivery, &pictures, options, monitor)
+}
+
+/// Full voxels that are softer than the densities by more than this factor hang together by corners.
+const SOFTER: f64 = 1.1;
+
+/// Warns where the full voxels of the optimization do not hold what its densities did.
+fn warn_steps(record: &Record, found: &Verified, monitor: &Monitor) {
+    let optimized = record.report.optimize.as_ref();
+    let grey = optimized.map_or(0.0, |o| o.case_compliance.iter().sum::<f64>() / 2.0);
+    let full = found
+        .proposal
+        .as_ref()
+        .map_or(0.0, |p| p.coarse.strain_energy);
+    if grey > 0.0 && full > SOFTER * grey {
+        let text = format!(
+            "the full voxels of the optimization are {:.2} times as soft as its densities: walls hang together by the corners of their voxels; --set optimize.robust=0.03 makes them hold",
+            full / grey
+        );
+        monitor.warn("verify", text);
+    }
 }
 
 /// Refuses options of late stages before anything is computed.
@@ -149,21 +177,23 @@ fn files(lists: &[&[(&'static str, &'static str)]]) -> Vec<(&'static str, &'stat
     out
 }
 
-/// The reconstruction of what the optimization left.
-fn reconstruction(job: &RunJob) -> ReconstructJob {
+/// The reconstruction of what the optimization on `grid` left.
+fn reconstruction(job: &RunJob, grid: [usize; 3]) -> ReconstructJob {
     let case = &job.case;
     let mut options = case.reconstruct.clone();
     if let (None, Some(draw)) = (options.mould.draw, &case.optimize.draw) {
         options.mould.draw = Some(draw.dir);
     }
-    options.read.field = Some(optimize::PROPOSAL.to_owned());
+    options.read.field = Some(optimize::ARRAY.to_owned());
+    let filter = case.optimize.radius(case.grid.h);
     if options.remesh.min_tunnel == RemeshOptions::default().min_tunnel {
         // The filter leaves no window narrower than its radius; what is narrower is the steps of a thin wall.
-        let filter = case.optimize.radius(case.grid.h);
         options.remesh.min_tunnel = options.remesh.min_tunnel.min(filter);
     }
+    // Widths are meant in voxels of the optimization.
+    options.remesh.min_tunnel *= topopt::split(grid, filter) as f64;
     ReconstructJob {
-        part: job.output.join(LEFT[0]),
+        part: job.output.join(optimize::PROPOSAL),
         bodies: case.non_design.clone(),
         folder: folder(job).to_owned(),
         output: job.output.clone(),

@@ -18,9 +18,6 @@ pub struct Chain<'a> {
     erosion: f64,
 }
 
-/// Slope of the smooth field by the field before the projection.
-const STEEP: f64 = 2.0;
-
 /// The fields of one evaluation, one value a design voxel: spaces fill but a part of their grid.
 #[derive(Debug, Clone, Default)]
 pub struct Fields {
@@ -104,21 +101,16 @@ impl<'a> Chain<'a> {
         Some(self.projected(fields, Some(projection.shifted(self.erosion))))
     }
 
-    /// The field before the projection, steepened about the threshold, which lies at 0.5: densities are nearly full or empty,
-    /// so that their surface has the steps of the voxels; this one passes through the same places and is smooth. A quarter
-    /// off the threshold it is full or empty, so that faces of the design space stay where they are. Empty before the first
-    /// iteration.
-    pub fn smooth(&self, fields: &Fields) -> Vec<f64> {
-        let eta = fields.projection.map_or(0.5, |p| p.eta);
-        let gain = if fields.projection.is_some() {
-            STEEP
-        } else {
-            1.0
-        };
-        let value = |&m: &f64| (0.5 + gain * (m - eta)).clamp(0.0, 1.0);
-        let mut smooth: Vec<f64> = fields.hulled.iter().map(value).collect();
-        self.symmetry.copy(&mut smooth);
-        smooth
+    /// Threshold of the projection; none where nothing was projected.
+    pub fn threshold(&self, fields: &Fields) -> Option<f64> {
+        fields.projection.map(|p| p.eta)
+    }
+
+    /// The field before the projection.
+    pub fn unprojected(&self, fields: &Fields) -> Vec<f64> {
+        let mut out = fields.hulled.clone();
+        self.symmetry.copy(&mut out);
+        out
     }
 
     fn projected(&self, fields: &Fields, projection: Option<Projection>) -> Vec<f64> {

@@ -14,6 +14,7 @@ mod options;
 mod problem;
 mod projection;
 mod run;
+mod smooth;
 mod state;
 mod symmetry;
 
@@ -31,6 +32,7 @@ pub use options::{
 };
 pub use problem::{CORE, DESIGN, FROZEN, LoadCase, OUTSIDE, Problem};
 pub use run::{HistoryEntry, Optimized, optimize, validate};
+pub use smooth::{Smooth, smooth, split, spread};
 pub use state::State;
 
 use crate::fe::FeError;

@@ -205,6 +205,11 @@ impl OptimizeOptions {
         2f64.powi(doublings.min(60) as i32).min(self.beta)
     }
 
+    /// Sharpness of the projection of iteration `i`; none where nothing is projected.
+    pub fn projects_at(&self, i: usize) -> Option<f64> {
+        (self.beta > 0.0).then(|| self.beta_at(i))
+    }
+
     /// Whether penalty and sharpness have reached their ends.
     pub fn is_final(&self, i: usize) -> bool {
         self.penalty_at(i) >= self.penalty && self.beta_at(i) >= self.beta

@@ -94,6 +94,22 @@ impl Problem {
         self.origin + self.h * Vec3::new(x as f64 + 0.5, y as f64 + 0.5, z as f64 + 0.5)
     }
 
+    /// The same labels with every voxel cut into `split` along each axis; without supports and loads.
+    pub fn cut(&self, split: usize) -> Self {
+        let dims = self.dims.map(|n| n * split);
+        let mut out = Self {
+            h: self.h / split as f64,
+            dims,
+            labels: Vec::new(),
+            fixed: Vec::new(),
+            cases: Vec::new(),
+            ..*self
+        };
+        let label = |v: usize| self.labels[self.index(out.at(v).map(|i| i / split))];
+        out.labels = (0..dims.iter().product()).map(label).collect();
+        out
+    }
+
     /// Position of a node, mm.
     pub fn node(&self, [x, y, z]: [usize; 3]) -> Vec3 {
         self.origin + self.h * Vec3::new(x as f64, y as f64, z as f64)

@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::finish::{Binary, binary};
 use super::options::{Objective, OptimizeOptions, UpdateKind};
 use super::problem::{DESIGN, FROZEN};
+use super::smooth::{Smooth, smooth};
 use super::state::State;
 use super::{Chain, Fields, Problem, TopoptError, oc};
 use crate::fe::{FeError, Solver, SolverOptions};
@@ -49,8 +50,8 @@ pub struct HistoryEntry {
 pub struct Optimized {
     /// Densities, `[z][y][x]`.
     pub rho: Vec<f64>,
-    /// The field whose surface at 0.5 is that of the part without the steps of the voxels, `[z][y][x]`.
-    pub smooth: Vec<f64>,
+    /// The part without the steps of the voxels.
+    pub smooth: Smooth,
     /// Full and empty voxels.
     pub binary: Binary,
     /// All iterations.
@@ -127,20 +128,19 @@ pub fn optimize(
         chain,
         solver,
         state,
+        last,
         target,
         fallbacks,
-        fields,
+        mut fields,
         ..
     } = run;
     drop(solver);
     out.rho = problem.on_grid(&state.rho, 1.0);
-    let smooth = chain.smooth(&fields);
-    out.smooth = if smooth.is_empty() {
-        // A saved state that had ended.
-        out.rho.clone()
-    } else {
-        problem.on_grid(&smooth, 1.0)
-    };
+    let x = last.map_or(state.x, |x| x.into_iter().map(f64::from).collect());
+    let beta = options.projects_at(state.iteration.saturating_sub(1));
+    chain.forward(&x, beta, &mut fields);
+    let eta = chain.threshold(&fields);
+    out.smooth = smooth(problem, options, &x, eta)?;
     out.binary = binary(problem, &chain, &out.rho, target);
     out.symmetry_error = chain.symmetry.error(problem, &out.rho).0;
     out.fallbacks = fallbacks;
@@ -198,6 +198,8 @@ struct Run<'a> {
     chain: Chain<'a>,
     solver: Solver,
     state: State,
+    /// The variables of the last iteration allowed: those of the state are for the next one.
+    last: Option<Vec<f32>>,
     /// Voxels of the variables.
     design: Vec<u32>,
     /// What lives as long as a solution has its place once: fields that come and go would split the memory.
@@ -248,6 +250,7 @@ impl<'a> Run<'a> {
             chain,
             solver,
             state,
+            last: None,
             design: problem.design().map(|v| v as u32).collect(),
             fields: Fields::default(),
             energy: vec![0.0; design as usize],
@@ -273,7 +276,7 @@ impl<'a> Run<'a> {
         let start = Instant::now();
         let i = self.state.iteration;
         let penalty = self.options.penalty_at(i);
-        let beta = (self.options.beta > 0.0).then(|| self.options.beta_at(i));
+        let beta = self.options.projects_at(i);
         let chain = &self.chain;
         chain.forward(&self.state.x, beta, &mut self.fields);
         let rho = chain.densities(&self.fields);
@@ -297,6 +300,9 @@ impl<'a> Run<'a> {
         self.state.iteration = i + 1;
         let ended = self.state.quiet >= QUIET;
         if !ended {
+            if i + 1 == self.options.max_iterations {
+                self.last = Some(self.state.x.iter().map(|&x| x as f32).collect());
+            }
             self.update(penalty, volume);
         }
         out.cases = response.cases;

@@ -282,6 +282,19 @@ fn draw_and_symmetry_hold_exactly() {
         let starts = (0..8).filter(|&k| full(k) && (k == 0 || !full(k - 1)));
         assert!(starts.count() <= 1, "column {column}");
     }
+    // So it does through the smooth field, at whatever value.
+    let cut = problem.cut(out.smooth.split);
+    let value = |x, y, z| out.smooth.values[cut.index([x, y, z])];
+    let [nx, ny, nz] = cut.dims;
+    for (x, y) in (0..nx).flat_map(|x| (0..ny).map(move |y| (x, y))) {
+        for z in 0..nz {
+            assert_eq!(value(x, y, z), value(x, ny - 1 - y, z));
+        }
+        for z in 1..nz / 2 {
+            assert!(value(x, y, z) >= value(x, y, z - 1));
+            assert!(value(x, y, nz - 1 - z) >= value(x, y, nz - z));
+        }
+    }
     let volumes: Vec<f64> = out.history.iter().map(|h| h.volume_fraction).collect();
     assert!((volumes[29] - 0.4).abs() < 0.01, "{volumes:?}");
     let first = out.history[1].compliance;

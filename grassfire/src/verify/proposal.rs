@@ -8,7 +8,7 @@ use crate::Vec3;
 use crate::case::{self, Case, conditions_on};
 use crate::fe::SolverOptions;
 use crate::monitor::Monitor;
-use crate::topopt::{DESIGN, OUTSIDE, Problem};
+use crate::topopt::{DESIGN, OUTSIDE};
 use crate::voxel::VoxelGrid;
 
 /// Full voxels solved as they are and with every voxel cut into eight.
@@ -63,7 +63,7 @@ pub(super) fn solve(
     for split in 1..=2 {
         let what = format!("proposal, voxels of {:.4} mm", problem.h / split as f64);
         monitor.step(STAGE, &what, 0.5 + 0.1 * split as f64)?;
-        let problem = cut(&problem, split);
+        let problem = problem.cut(split);
         let (fixed, cases) = conditions_on(case, &problem, folder, monitor)?;
         let conditions = Conditions {
             fixed,
@@ -87,23 +87,4 @@ pub(super) fn solve(
         coarse,
         fine,
     })
-}
-
-/// Every voxel cut into `split` along each axis.
-fn cut(problem: &Problem, split: usize) -> Problem {
-    let dims = problem.dims.map(|n| n * split);
-    let mut out = Problem {
-        h: problem.h / split as f64,
-        dims,
-        labels: Vec::new(),
-        fixed: Vec::new(),
-        cases: Vec::new(),
-        ..problem.clone()
-    };
-    let label = |v: usize| {
-        let at = [v % dims[0], v / dims[0] % dims[1], v / (dims[0] * dims[1])];
-        problem.labels[problem.index(at.map(|i| i / split))]
-    };
-    out.labels = (0..dims.iter().product()).map(label).collect();
-    out
 }
