@@ -139,8 +139,8 @@ pub struct OptimizeOptions {
     /// Sharpness of the projection at the end; 0 switches the projection off.
     pub beta: f64,
     /// Robust formulation: the threshold of the projection is larger by this for the densities whose stiffness counts, so
-    /// that members hold when they are eroded, and hinges and walls of one voxel do not pay. 0 switches it off; 0.2 with a
-    /// filter radius R keeps members thicker than about R.
+    /// that members hold when they are eroded, and hinges and walls of one voxel do not pay. 0 switches it off; 0.03
+    /// makes walls of a few voxels hold together, 0.2 with a filter radius R keeps members thicker than about R.
     pub robust: f64,
     /// Iteration at which the sharpness begins to double.
     pub beta_start: usize,
