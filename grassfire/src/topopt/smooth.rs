@@ -4,8 +4,8 @@ use super::{Chain, Fields, OptimizeOptions, Problem, TopoptError};
 
 /// Slope of the smooth field by the field before the projection.
 const STEEP: f64 = 2.0;
-/// Voxels are cut into two along each axis, where that makes no more than so many.
-const MOST: usize = 1 << 25;
+/// Voxels are cut into two along each axis where that makes no more than so many: they take less memory than the solver did.
+const MOST: usize = 1 << 22;
 /// Filter radii, voxels: with a smaller one there is no filter, with a larger one the field is even enough as it is.
 const RADII: [f64; 2] = [1.0, 6.0];
 
