@@ -52,8 +52,12 @@ pub(super) fn field(
     };
     let wanted = full.values.iter().map(|&v| f64::from(v)).sum::<f64>() * h.powi(3);
     let excess = |by: f64| -> Result<f64, RemeshError> {
-        let surface = iso_surface(&moved(by), ISO, &RemeshOptions::default(), monitor)?;
-        Ok(surface.volume() / wanted - 1.0)
+        match iso_surface(&moved(by), ISO, &RemeshOptions::default(), monitor) {
+            Ok(surface) => Ok(surface.volume() / wanted - 1.0),
+            // Moved so far that nothing is left.
+            Err(RemeshError::NoMaterial { .. } | RemeshError::Empty) => Ok(-1.0),
+            Err(error) => Err(error),
+        }
     };
     Ok(moved(root(excess)?))
 }
@@ -166,6 +170,29 @@ mod tests {
         let field = field(&problem, &smooth, &full, 0.0, &Monitor::default()).expect("a field");
         let same = |v: usize| problem.labels[v] == DESIGN || field.values[v] == full.values[v];
         assert!((0..full.values.len()).all(same));
+    }
+
+    #[test]
+    fn a_field_that_would_vanish_when_moved_farthest_is_moved_as_far_as_it_must() {
+        let (problem, mut smooth, full) = wall();
+        smooth
+            .values
+            .iter_mut()
+            .for_each(|v| *v = v.clamp(0.0, 1.0));
+        let thin = VoxelGrid {
+            values: full
+                .values
+                .iter()
+                .enumerate()
+                .map(|(v, &f)| if problem.at(v)[2] < 8 { f } else { 0.0 })
+                .collect(),
+            ..full.clone()
+        };
+        let wanted: f64 = thin.values.iter().map(|&v| f64::from(v)).sum();
+        let field = field(&problem, &smooth, &thin, 0.0, &Monitor::default()).expect("a field");
+        let surface = iso_surface(&field, ISO, &RemeshOptions::default(), &Monitor::default());
+        let volume = surface.expect("a surface").volume();
+        assert!((volume / wanted - 1.0).abs() < 0.01, "{volume} {wanted}");
     }
 
     #[test]
