@@ -130,7 +130,7 @@ fn searched<'a>(
 
 impl<'a> Search<'a> {
     fn new(job: &'a ReconstructJob, monitor: &Monitor) -> Result<Self, PipelineError> {
-        // Figures of this are those of the final run once more.
+        // The part that is chosen is read and remeshed once more, with figures of its own.
         let mut record = Record::start(&job.command);
         let first = prepared(&mut record, job, monitor)?;
         let from = first.edited.as_ref().unwrap_or(&first.remeshed);
@@ -171,7 +171,7 @@ impl<'a> Search<'a> {
         self.rooms.iter().enumerate().map(way)
     }
 
-    /// Such as `1-core 2-turn`; rooms that are filled are not named.
+    /// Such as `1-core_2-turn`; rooms that are filled are not named.
     fn name(&self, ways: &[usize]) -> String {
         let named = self.picked(ways).enumerate();
         let parts: Vec<String> = named
