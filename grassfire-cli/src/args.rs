@@ -68,7 +68,8 @@ const RECONSTRUCT_EXAMPLES: &str = "\
 Examples:
   grassfire reconstruct part.stl -o out
   grassfire reconstruct part.stl --non-design bores.step --voxel 0.8 -o out
-  grassfire reconstruct density.vti --iso 0.4 --set remesh.min_tunnel=0 -o out --json";
+  grassfire reconstruct density.vti --iso 0.4 --set remesh.min_tunnel=0 -o out --json
+  grassfire reconstruct part.stl --draw 0,0,1 --set mould.repair=best --case case.toml -o out";
 
 const SOLIDIFY_EXAMPLES: &str = "\
 Examples:
@@ -160,6 +161,9 @@ pub struct ReconstructArgs {
     /// Draw direction of the mould: the finished part is looked at along it (mould.draw, feed.draw)
     #[arg(long, value_name = "DX,DY,DZ", value_parser = vector, allow_hyphen_values = true)]
     pub draw: Option<[f64; 3]>,
+    /// Project file (TOML) whose loads tell which repair of undercuts is best (for mould.repair=best)
+    #[arg(long, value_name = "CASE")]
+    pub case: Option<PathBuf>,
     /// Refuse a mesh that needs repair (repair.strict)
     #[arg(long)]
     pub strict: bool,

@@ -11,9 +11,14 @@ use crate::args::{CaseArgs, ChainArgs, ChainEnd, CheckArgs, RunArgs, TetSolver, 
 use crate::failure::{Failure, chain};
 use crate::{run, settings};
 
+/// The project file as it is.
+pub fn read(path: &Path) -> Result<Case, Failure> {
+    Case::read(path).map_err(refused)
+}
+
 /// The project file with the settings of the command line.
 pub fn load(path: &Path, args: &RunArgs) -> Result<Case, Failure> {
-    let mut case = Case::read(path).map_err(refused)?;
+    let mut case = read(path)?;
     if let Some(threads) = args.threads {
         case.threads = threads;
     }

@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use grassfire::monitor::Monitor;
 use grassfire::pipeline::{
-    Format, Outcome, PipelineError, ReconstructJob, ReconstructOptions, SolidJob, mould_solid,
-    reconstruct, solidify_solid,
+    Format, Loads, Outcome, PipelineError, ReconstructJob, ReconstructOptions, SolidJob,
+    mould_solid, reconstruct, solidify_solid,
 };
 use grassfire::report;
 
@@ -17,7 +17,7 @@ use crate::args::{
 };
 use crate::failure::{Failure, chain};
 use crate::progress::{Bar, Shared, Talk};
-use crate::{settings, summary};
+use crate::{case, settings, summary};
 
 /// `grassfire reconstruct`.
 pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
@@ -59,8 +59,16 @@ pub fn reconstruct_command(args: &ReconstructArgs) -> Result<u8, Failure> {
     for key in ["feed.draw", "mould.draw"] {
         short.extend(args.draw.map(|d| (key, format!("{d:?}"))));
     }
+    let loads = match &args.case {
+        Some(path) => Some(Loads {
+            case: case::read(path)?,
+            path: path.clone(),
+        }),
+        None => None,
+    };
     let job = ReconstructJob {
         part: args.part.clone(),
+        loads,
         non_design: args.non_design.clone(),
         design_space: args.design_space.clone(),
         skeleton: args.skeleton.clone(),

@@ -205,6 +205,21 @@ fn casting(report: &Report) -> Vec<(&'static str, String)> {
         );
         lines.push(("feeding", text));
     }
+    if let Some(block) = &report.repairs {
+        let chosen = block.variants.iter().find(|v| v.chosen);
+        let text = format!(
+            "{} rooms, {} variants, best {} ({})",
+            block.rooms.len(),
+            block.variants.len(),
+            chosen.map_or("none", |v| v.name.as_str()),
+            if block.by_stiffness {
+                "energy times volume"
+            } else {
+                "volume only: no loads"
+            }
+        );
+        lines.push(("repairs", text));
+    }
     if let Some(block) = &report.mould {
         let text = format!(
             "{} undercuts of {:.0} mm3 along ({:.3}, {:.3}, {:.3}), parting within {:.2} mm, {} findings",

@@ -5,6 +5,7 @@ mod support;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use serde_json::Value;
 use support::{HOLE, Run, SIDE, THICK, number, plate, plate_with_hole, reconstruct, run_plate};
 
 fn command(name: &str, folder: &Path, args: &[&str]) -> Output {
@@ -197,11 +198,8 @@ fn prism(section: &[[f32; 4]], length: f32) -> Vec<u8> {
     out
 }
 
-/// A channel with its open side across the draw: without its smaller flange nothing has to be filled.
-#[test]
-fn the_lesser_of_two_members_with_a_room_between_is_removed() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let part = folder.path().join("channel.stl");
+/// A channel 40 mm long with its open side across the draw; its lower flange is the smaller one.
+fn channel(folder: &Path) -> PathBuf {
     let section = [
         [0.0, 0.0, 4.0, 4.0],
         [0.0, 4.0, 4.0, 24.0],
@@ -209,7 +207,89 @@ fn the_lesser_of_two_members_with_a_room_between_is_removed() {
         [4.0, 0.0, 16.0, 4.0],
         [4.0, 24.0, 22.0, 28.0],
     ];
-    std::fs::write(&part, prism(&section, 40.0)).expect("writes");
+    let path = folder.join("channel.stl");
+    std::fs::write(&path, prism(&section, 40.0)).expect("writes");
+    path
+}
+
+/// The channel as a cantilever that is bent along z.
+const BENT: &str = r#"
+units = "mm-N-MPa"
+[grid]
+h = 2.0
+[material]
+young = 70000.0
+nu = 0.3
+[design]
+space = [{ box = { min = [0, 0, 0], max = [22, 40, 28] } }]
+[select]
+root = { plane = { point = [0, 0, 0], normal = [0, 1, 0] } }
+tip = { plane = { point = [0, 40, 0], normal = [0, 1, 0] } }
+[[support]]
+on = "root"
+fix = "xyz"
+[[case]]
+name = "bend"
+loads = [{ on = "tip", force = [0, 0, 1000] }]
+[verify]
+h = 2.0
+"#;
+
+#[test]
+fn the_best_repair_has_the_least_energy_times_volume_with_cores_as_metal() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (part, case) = (channel(folder.path()), folder.path().join("case.toml"));
+    std::fs::write(&case, BENT).expect("writes");
+    let case = case.display().to_string();
+    let shared = [
+        "--draw",
+        "0,0,1",
+        "--set",
+        "mould.repair=best",
+        "--recognise",
+        "off",
+    ];
+    let coarse = ["--voxel", "1.2", "--set", "report.pictures=false"];
+    let run = |name: &str, more: &[&str]| {
+        let args = [&shared, &coarse[..], more].concat();
+        let run = reconstruct(&part, &folder.path().join(name), &args);
+        assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+        run.report()
+    };
+    let report = run("loaded", &["--case", &case]);
+    let block = &report["repairs"];
+    let rows = block["variants"].as_array().expect("variants");
+    let names: Vec<&str> = rows.iter().filter_map(|row| row["name"].as_str()).collect();
+    assert_eq!(names, ["fill", "1-core", "1-remove", "1-turn"]);
+    let of = |row: &Value, key: &str| row[key].as_f64().expect("a number");
+    let price = of(block, "core_price");
+    for row in rows {
+        assert_eq!(of(row, "lines_repaired"), 0.0, "{row}");
+        assert_eq!(row["valid"], true, "{row}");
+        let metal = of(row, "volume") + of(row, "cores") * price;
+        let cost = metal * of(row, "strain_energy");
+        assert!((of(row, "cost") / cost - 1.0).abs() < 1e-12, "{row}");
+    }
+    let least = |a: &&Value, b: &&Value| of(a, "cost").total_cmp(&of(b, "cost"));
+    let best = rows.iter().min_by(least).expect("rows");
+    assert_eq!(best["chosen"], true);
+    assert_eq!(number(&report, "/volume/solid"), of(best, "volume"));
+    // Without loads nothing is taken away or turned, and with cores for nothing the least metal is the best.
+    let report = run("unloaded", &["--set", "mould.core_price=0"]);
+    let rows = report["repairs"]["variants"].as_array().expect("variants");
+    let chosen: Vec<bool> = rows.iter().map(|row| row["chosen"] == true).collect();
+    assert_eq!(chosen, [false, true]);
+    assert_eq!(rows[1]["name"], "1-core");
+    // A finished solid has no members to choose among.
+    let refused = command("mould", folder.path(), &["--set", "mould.repair=best"]);
+    assert_eq!(refused.status.code(), Some(2));
+}
+
+/// Without the smaller flange of the channel nothing has to be filled.
+#[test]
+fn the_lesser_of_two_members_with_a_room_between_is_removed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let part = channel(folder.path());
     let args = [
         "--draw",
         "0,0,1",

@@ -77,8 +77,13 @@ impl Monitor {
 
     /// Forgets the warnings, so that the next of several runs starts without them.
     pub fn clear_warnings(&self) {
+        self.keep_warnings(0);
+    }
+
+    /// Forgets all warnings but the first `count`.
+    pub fn keep_warnings(&self, count: usize) {
         if let Ok(mut list) = self.warnings.lock() {
-            list.clear();
+            list.truncate(count);
         }
     }
 

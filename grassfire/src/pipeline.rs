@@ -21,6 +21,7 @@ mod optimize;
 mod proposal;
 mod recognise;
 mod record;
+mod repairs;
 mod run;
 mod score;
 mod shape;
@@ -38,6 +39,7 @@ pub use casting::{SolidJob, mould_solid, solidify_solid};
 pub use error::{PipelineError, StageError};
 pub use exchange::{FileOptions, Format};
 pub use optimize::{OptimizeJob, check_case, optimize};
+pub use repairs::Loads;
 pub use run::{RunJob, Stage, run, share_optimization};
 pub use shape::RetryOptions;
 pub use verify::{VerifyJob, verify_solid};
@@ -45,7 +47,7 @@ pub use verify::{VerifyJob, verify_solid};
 use crate::cad::{CadOptions, NonDesignOptions, StepOptions};
 use crate::case::Body;
 use crate::casting::feed::FeedOptions;
-use crate::casting::mould::MouldOptions;
+use crate::casting::mould::{MouldOptions, Repair};
 use crate::casting::solidify::SolidifyOptions;
 use crate::edit::Edit;
 use crate::fit::FitOptions;
@@ -55,12 +57,13 @@ use crate::mesh::{RepairOptions, TriMesh};
 use crate::monitor::Monitor;
 use crate::non_design::FlatOptions;
 use crate::radii::RadiiOptions;
-use crate::remesh::{CutOutOptions, RemeshOptions, WrapOptions};
+use crate::remesh::{CutOutOptions, RemeshOptions, Remeshed, WrapOptions};
 use crate::report::{Picture, Report, ReportOptions};
 use crate::skeleton::SkeletonOptions;
 use crate::spline::{BrepOptions, PatchOptions, TessellateOptions};
 use crate::thicken::ThickenOptions;
 
+use bodies::Bodies;
 use construct::{Made, Site};
 use deliver::Delivery;
 use record::Record;
@@ -138,6 +141,8 @@ pub struct ReconstructJob {
     pub bodies: Vec<Body>,
     /// Folder of the project file.
     pub folder: PathBuf,
+    /// The loads by which repairs of undercuts are compared (`mould.repair=best`).
+    pub loads: Option<Loads>,
     /// Folder for all results; made when it does not exist.
     pub output: PathBuf,
     /// What stands for the run in the report.
@@ -159,7 +164,8 @@ pub struct Outcome {
 ///
 /// 1. Reads the proposal and the non-design bodies; repairs the mesh; recognises bores and bosses in it.
 /// 2. Remeshes it on voxels to a closed solid and removes topological noise.
-/// 3. Replays the list of edits; with a draw direction and a repair, takes undercuts away. Computes wall thickness (poles).
+/// 3. Replays the list of edits; with a draw direction and a repair, takes undercuts away (the best repair is looked for before
+///    all this, among parts made by these steps). Computes wall thickness (poles).
 /// 4. With feeders, lets the proposal's sections grow towards them.
 /// 5. Cuts the non-design bodies out; steps 6 to 9 are done with what is left, and once more with the whole proposal when
 ///    that does not give a valid union.
@@ -215,21 +221,24 @@ fn finish(
     })
 }
 
-/// All stages of [`reconstruct`] but the report.
-fn rebuild(
+/// A proposal that a part can be made of.
+struct Prepared {
+    bodies: Bodies,
+    remeshed: Remeshed,
+    /// What the list of edits made of it, when there is one.
+    edited: Option<Remeshed>,
+}
+
+/// The first stages of [`rebuild`]: reading, recognition, remesh, edits.
+fn prepared(
     record: &mut Record,
     job: &ReconstructJob,
     monitor: &Monitor,
-) -> Result<Rebuilt, PipelineError> {
+) -> Result<Prepared, PipelineError> {
     let options = &job.options;
-    exchange::check(options).map_err(|source| PipelineError {
-        stage: "options",
-        source,
-    })?;
     let mut bodies = record.stage("non_design", || bodies::read(job, monitor))?;
     let proposal = record.stage("read", || inputs::proposal(job, monitor))?;
     record.stage("read", || bodies.check_unit(proposal.bounds()))?;
-    let drawn = record.stage("read", || inputs::skeleton(job, monitor))?;
     record.report.inputs = record.stage("read", || inputs::fingerprints(job, monitor))?;
     record.report.input = Some(proposal.block());
     let recognised = record.stage("recognise", || {
@@ -243,6 +252,37 @@ fn rebuild(
     })?;
     record.report.remesh = Some(measure::remesh_block(&remeshed));
     let edited = edits::edited(record, &remeshed, &bodies, options, monitor)?;
+    Ok(Prepared {
+        bodies,
+        remeshed,
+        edited,
+    })
+}
+
+/// All stages of [`reconstruct`] but the report.
+fn rebuild(
+    record: &mut Record,
+    job: &ReconstructJob,
+    monitor: &Monitor,
+) -> Result<Rebuilt, PipelineError> {
+    exchange::check(&job.options).map_err(|source| PipelineError {
+        stage: "options",
+        source,
+    })?;
+    let drawn = record.stage("read", || inputs::skeleton(job, monitor))?;
+    let chosen;
+    let job = if job.options.mould.repair == Repair::Best {
+        chosen = repairs::best(record, job, monitor)?;
+        &chosen
+    } else {
+        job
+    };
+    let options = &job.options;
+    let Prepared {
+        mut bodies,
+        remeshed,
+        edited,
+    } = prepared(record, job, monitor)?;
     // Undercuts last: whatever the edits did, none are left.
     let from = edited.as_ref().unwrap_or(&remeshed);
     let repaired = casting::drawn_out(record, from, &bodies, options, monitor)?;

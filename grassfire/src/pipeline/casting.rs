@@ -96,8 +96,8 @@ pub fn mould_solid(job: &SolidJob, monitor: &Monitor) -> Result<Outcome, Pipelin
     let options = &job.options;
     let mut record = Record::start(&job.command);
     record.stage("options", || match options.mould.repair {
-        repair if repair.edits_members() => Err(mould::MouldError::NoSkeleton),
-        _ => Ok(()),
+        repair if repair.takes_solids() => Ok(()),
+        _ => Err(mould::MouldError::NoSkeleton),
     })?;
     let mesh = record.stage("read", || solid(job, monitor))?;
     record.report.inputs = record.stage("read", || {
@@ -178,6 +178,7 @@ pub(super) fn mould_of(
     let options = MouldOptions {
         repair: Repair::Off,
         repair_draft: 0.0,
+        removals: Vec::new(),
         ..options.clone()
     };
     let found = record.stage("mould", || mould(part, &options, monitor))?;

@@ -14,7 +14,7 @@ use crate::monitor::Monitor;
 use crate::radii;
 use crate::remesh::Remeshed;
 use crate::report::EditBlock;
-use crate::skeleton;
+use crate::skeleton::{self, Skeleton};
 use crate::voxel::VoxelGrid;
 
 /// Name of this stage in progress and warnings.
@@ -47,14 +47,7 @@ pub(super) fn edited(
     }
     record.stage("options", || check_edits(&options.edits))?;
     let voxel = from.field.spacing;
-    let axis = record.stage("medial", || {
-        medial::medial_axis(&from.field, &options.medial, monitor)
-    })?;
-    let before = record.stage("skeleton", || {
-        let mut quads = skeleton::quad_skeleton(&axis.mesh, voxel, &options.skeleton, monitor)?;
-        radii::smooth(&mut quads.skeleton, options.radii.smoothing);
-        Ok::<_, StageError>(quads.skeleton)
-    })?;
+    let before = skeleton_of(record, from, options, monitor)?;
     let kept = belonging(bodies, &before.points, &before.radii);
     let mut edited = record.stage(STAGE, || {
         edit(&before, &kept, &options.edits, LEAST * voxel)
@@ -84,6 +77,24 @@ pub(super) fn edited(
         edits: edited.done,
     });
     Ok(Some(changed))
+}
+
+/// The skeleton of a proposal with its smoothed radii.
+pub(super) fn skeleton_of(
+    record: &mut Record,
+    from: &Remeshed,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Skeleton, PipelineError> {
+    let axis = record.stage("medial", || {
+        medial::medial_axis(&from.field, &options.medial, monitor)
+    })?;
+    record.stage("skeleton", || {
+        let voxel = from.field.spacing;
+        let mut quads = skeleton::quad_skeleton(&axis.mesh, voxel, &options.skeleton, monitor)?;
+        radii::smooth(&mut quads.skeleton, options.radii.smoothing);
+        Ok::<_, StageError>(quads.skeleton)
+    })
 }
 
 /// Turns or removes members that shadow each other along the draw direction, when the repair is of that kind.

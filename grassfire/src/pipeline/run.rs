@@ -10,7 +10,9 @@ use super::deliver::{self, Delivery};
 use super::error::{PipelineError, StageError};
 use super::optimize::{self, OptimizeJob};
 use super::record::Record;
-use super::{Outcome, ReconstructJob, exchange, finish, inputs, rebuild, tetrahedra, verify};
+use super::{
+    Loads, Outcome, ReconstructJob, exchange, finish, inputs, rebuild, tetrahedra, verify,
+};
 use crate::case::Case;
 use crate::io::{self, IoError};
 use crate::monitor::{Cancelled, Monitor};
@@ -196,6 +198,10 @@ fn reconstruction(job: &RunJob, grid: [usize; 3]) -> ReconstructJob {
         part: job.output.join(optimize::PROPOSAL),
         bodies: case.non_design.clone(),
         folder: folder(job).to_owned(),
+        loads: Some(Loads {
+            case: case.clone(),
+            path: job.path.clone(),
+        }),
         output: job.output.clone(),
         command: job.command.clone(),
         options,

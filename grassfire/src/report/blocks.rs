@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Check, EditBlock, FeedBlock, MouldBlock, SolidifyBlock, VerifyBlock};
+use super::{Check, EditBlock, FeedBlock, MouldBlock, RepairsBlock, SolidifyBlock, VerifyBlock};
 use crate::monitor::Warning;
 use crate::remesh::{ChangeKind, TopologyChange};
 use crate::spline::CurvatureJump;
@@ -50,6 +50,9 @@ pub struct Report {
     /// The mould.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mould: Option<MouldBlock>,
+    /// The search for the best repair of undercuts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repairs: Option<RepairsBlock>,
     /// Solidification.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub solidify: Option<SolidifyBlock>,

@@ -43,6 +43,7 @@ pub fn to_html(report: &Report, pictures: &[Picture]) -> String {
                 (non_design(&report.non_design))
                 (super::editing::section(report))
                 (super::verification::section(report))
+                (super::repairs::section(report))
                 (super::casting::sections(report))
                 (super::recognised::section(report))
                 (stages(report))

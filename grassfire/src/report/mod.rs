@@ -12,6 +12,7 @@ mod html;
 pub mod papers;
 mod recognised;
 pub mod render;
+mod repairs;
 mod verification;
 
 use std::path::Path;
@@ -33,6 +34,7 @@ pub use casting::{
 pub use checks::{Check, Limits, judge};
 pub use editing::EditBlock;
 pub use html::to_html;
+pub use repairs::{RepairsBlock, RoomBlock, VariantBlock};
 pub use verification::{LoadCaseBlock, ProposalBlock, TetrahedraBlock, VerifyBlock};
 
 use crate::io::{IoError, atomic_write};

@@ -5,45 +5,40 @@ use crate::Vec3;
 use crate::remesh::Capsule;
 use crate::voxel::VoxelGrid;
 
-/// A core must be named within so many voxels of its undercut.
+/// A place must be named within so many voxels of its undercut.
 const NEAR: f64 = 3.0;
 
-/// The empty voxels that cores fill: the undercuts at `places`, and what lies in `bores`.
+/// The empty voxels that cores fill: the undercuts at `places`, and what is undercut in `bores`.
 ///
 /// 1. Undercut is what is empty and has material below and above it on its line along z.
 /// 2. From the undercut voxel nearest to each place everything that is connected to it by faces is one core.
 ///
 /// # Errors
-/// [`MouldError::Core`] for a place away from all undercuts.
+/// [`MouldError::Place`] for a place away from all undercuts.
 pub(super) fn cored(
     field: &VoxelGrid<f32>,
     places: &[Vec3],
     bores: &[Capsule],
 ) -> Result<Vec<bool>, MouldError> {
     let mut out = vec![false; field.values.len()];
-    if !places.is_empty() {
-        let undercut = undercut(field);
-        for place in places {
-            flood(
-                field,
-                &undercut,
-                nearest(field, &undercut, place)?,
-                &mut out,
-            );
-        }
+    if places.is_empty() && bores.is_empty() {
+        return Ok(out);
     }
-    if !bores.is_empty() {
-        for (v, core) in out.iter_mut().enumerate() {
-            let [i, j, k] = field.ijk(v);
-            let p = field.centre(i, j, k);
-            *core |= field.values[v] <= 0.0 && bores.iter().any(|bore| holds(bore, &p));
-        }
+    let undercut = undercut(field);
+    for place in places {
+        let start = nearest(field, &undercut, place, "cores")?;
+        flood(field, &undercut, start, &mut out);
+    }
+    for (v, core) in out.iter_mut().enumerate().filter(|(v, _)| undercut[*v]) {
+        let [i, j, k] = field.ijk(v);
+        let p = field.centre(i, j, k);
+        *core |= bores.iter().any(|bore| holds(bore, &p));
     }
     Ok(out)
 }
 
 /// Empty voxels between material on their lines.
-fn undercut(field: &VoxelGrid<f32>) -> Vec<bool> {
+pub(super) fn undercut(field: &VoxelGrid<f32>) -> Vec<bool> {
     let [nx, ny, nz] = field.dims;
     let mut out = vec![false; field.values.len()];
     for j in 0..ny {
@@ -60,8 +55,13 @@ fn undercut(field: &VoxelGrid<f32>) -> Vec<bool> {
     out
 }
 
-/// The undercut voxel nearest to a place.
-fn nearest(field: &VoxelGrid<f32>, undercut: &[bool], place: &Vec3) -> Result<usize, MouldError> {
+/// The undercut voxel nearest to a place of the option `list`.
+pub(super) fn nearest(
+    field: &VoxelGrid<f32>,
+    undercut: &[bool],
+    place: &Vec3,
+    list: &'static str,
+) -> Result<usize, MouldError> {
     let away = |v: &usize| {
         let [i, j, k] = field.ijk(*v);
         (field.centre(i, j, k) - place).norm()
@@ -71,12 +71,12 @@ fn nearest(field: &VoxelGrid<f32>, undercut: &[bool], place: &Vec3) -> Result<us
     let distance = found.as_ref().map_or(f64::INFINITY, away);
     match found {
         Some(v) if distance <= NEAR * field.spacing => Ok(v),
-        _ => Err(MouldError::Core { distance }),
+        _ => Err(MouldError::Place { list, distance }),
     }
 }
 
 /// Marks what is connected to a voxel by faces.
-fn flood(field: &VoxelGrid<f32>, undercut: &[bool], start: usize, out: &mut [bool]) {
+pub(super) fn flood(field: &VoxelGrid<f32>, undercut: &[bool], start: usize, out: &mut [bool]) {
     let [nx, ny, _] = field.dims;
     let mut stack = vec![start];
     while let Some(v) = stack.pop() {

@@ -1,11 +1,13 @@
 //! The mould: undercuts, parting, draft, walls, the best draw direction, and repair.
 
+mod choose;
 mod conflicts;
 mod cores;
 pub mod dexels;
 pub mod directions;
 pub mod draft;
 pub mod repair;
+mod rooms;
 pub mod rules;
 #[cfg(test)]
 mod tests;
@@ -15,11 +17,13 @@ mod walls;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use choose::choose;
 pub use conflicts::{Conflict, conflicts};
 pub use dexels::{Dexels, Lattice, dexels, dexels_on};
 pub use directions::{Direction, best_direction};
 pub use draft::DraftClass;
 pub use repair::{Repair, RepairOptions, Repaired, repair};
+pub use rooms::{Room, rooms};
 pub use rules::{Alloy, Limit, Process, Rules};
 pub use undercuts::{Undercut, parting, undercuts};
 pub use walls::{Wall, walls};
@@ -57,6 +61,14 @@ pub struct MouldOptions {
     pub repair_draft: f64,
     /// A place in each undercut that a core makes, mm: a repair leaves it open.
     pub cores: Vec<[f64; 3]>,
+    /// A place in each undercut whose lesser side, below or above it along the draw direction, is taken away, mm.
+    pub removals: Vec<[f64; 3]>,
+    /// For the repair `best`: what one more core costs, as the volume of metal that costs as much, mm3; without it a tenth of the
+    /// proposal's volume.
+    pub core_price: Option<f64>,
+    /// For the repair `best`: most variants that are made. All combinations are where that is enough, else the undercuts are
+    /// settled one after another, the largest first.
+    pub tries: usize,
     /// Voxel of the repair, mm; without it the pitch of the lines.
     pub cell: Option<f64>,
     /// Limits of the foundry.
@@ -76,6 +88,9 @@ impl Default for MouldOptions {
             fill_cost: 0.5,
             repair_draft: 0.0,
             cores: Vec::new(),
+            removals: Vec::new(),
+            core_price: None,
+            tries: 12,
             cell: None,
             rules: Rules::default(),
         }
@@ -85,7 +100,7 @@ impl Default for MouldOptions {
 impl MouldOptions {
     /// A repair is asked for.
     pub fn repairs(&self) -> bool {
-        self.repair != Repair::Off || self.repair_draft > 0.0
+        self.repair != Repair::Off || self.repair_draft > 0.0 || !self.removals.is_empty()
     }
 
     /// The repair that is asked for, with the parting plane at a height along the draw direction and voxels of `cell`, mm.
@@ -98,6 +113,7 @@ impl MouldOptions {
             cell,
             cores: self.cores.iter().map(|p| Vec3::from(*p)).collect(),
             bores: Vec::new(),
+            removals: self.removals.iter().map(|p| Vec3::from(*p)).collect(),
         }
     }
 }
@@ -160,14 +176,18 @@ pub enum MouldError {
         allowed: &'static str,
     },
     /// Members are to be edited of a part whose skeleton is not known.
-    #[error("mould.repair turns or removes members of a skeleton; a finished solid has none")]
+    #[error(
+        "mould.repair turns or removes members of a skeleton, or tries that; a finished solid has none"
+    )]
     NoSkeleton,
     /// Nothing there.
     #[error("the part has no surface")]
     Empty,
-    /// A core is named where nothing is undercut.
-    #[error("a core of mould.cores is {distance:.1} mm from the nearest undercut of the part")]
-    Core {
+    /// A place is named where nothing is undercut.
+    #[error("a place of mould.{list} is {distance:.1} mm from the nearest undercut of the part")]
+    Place {
+        /// The option that has the place.
+        list: &'static str,
         /// Distance to the nearest undercut, mm.
         distance: f64,
     },
@@ -189,7 +209,7 @@ impl MouldError {
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Option { .. } => Some("`grassfire schema` lists all options".to_owned()),
-            Self::Core { .. } => {
+            Self::Place { .. } => {
                 Some("the report of `grassfire mould` lists the undercuts with their places".into())
             }
             Self::NoSkeleton => {
@@ -367,9 +387,14 @@ pub fn check(options: &MouldOptions) -> Result<(), MouldError> {
     )?;
     range("exempt", options.exempt, 0.0, 0.5, "0 to 0.5")?;
     range("fill_cost", options.fill_cost, 0.0, 1e6, "0 or more")?;
-    for place in options.cores.iter().flatten() {
-        range("cores", *place, -1e9, 1e9, "places in mm")?;
+    for (name, places) in [("cores", &options.cores), ("removals", &options.removals)] {
+        for place in places.iter().flatten() {
+            range(name, *place, -1e9, 1e9, "places in mm")?;
+        }
     }
+    let price = options.core_price.unwrap_or(0.0);
+    range("core_price", price, 0.0, 1e12, "0 or more, mm3")?;
+    range("tries", options.tries as f64, 1.0, 1000.0, "1 to 1000")?;
     range("repair_draft", options.repair_draft, 0.0, 30.0, "0 to 30")?;
     range(
         "cell",

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cores::cored;
 use super::dexels::axes;
+use super::rooms::remove_lesser;
 use super::{MouldError, STAGE};
 use crate::Vec3;
 use crate::fe::components;
@@ -29,12 +30,20 @@ pub enum Repair {
     Turn,
     /// Every line keeps the interval that is worth most: material counts 1, filling costs `mould.fill_cost`.
     Keep,
+    /// For every room that only a core makes: filled, cored, its lesser side removed, or its members turned, whichever gives the
+    /// stiffest part for its metal and cores. Every variant is made and proved.
+    Best,
 }
 
 impl Repair {
     /// Whether members of the skeleton are edited first.
     pub fn edits_members(self) -> bool {
         matches!(self, Self::Remove | Self::Turn)
+    }
+
+    /// Whether a finished solid, which has no skeleton, can be repaired so.
+    pub fn takes_solids(self) -> bool {
+        !self.edits_members() && self != Self::Best
     }
 }
 
@@ -55,6 +64,8 @@ pub struct RepairOptions {
     pub cores: Vec<Vec3>,
     /// Bores that cores make likewise.
     pub bores: Vec<Capsule>,
+    /// A place in each undercut whose lesser side is taken away, mm.
+    pub removals: Vec<Vec3>,
 }
 
 /// A part without undercuts.
@@ -72,53 +83,44 @@ pub struct Repaired {
 ///
 /// 1. The part is turned so that the draw direction is z and measured on voxels of `cell` mm (signed distances).
 ///    What cores make counts as material until the end.
-/// 2. [`Repair::Fill`]: every value becomes at least the smaller of the largest values above and below it on its line. All
+/// 2. The lesser sides at `removals` go; pieces that hang on nothing any more go, too, with a warning.
+/// 3. [`Repair::Fill`]: every value becomes at least the smaller of the largest values above and below it on its line. All
 ///    level sets of the result are single intervals, so the surface between voxels is, too.
-/// 3. [`Repair::Keep`]: on every line the interval with the largest sum of +1 a solid and `-cost` an empty voxel (Kadane's
-///    maximum subarray, exact); what lies outside goes, what lies inside is filled as above. Pieces that hang on nothing
-///    any more go, too, with a warning.
-/// 4. Draft: from both ends towards `parting`, every value becomes at least the one before plus the tangent of the draft
+/// 4. [`Repair::Keep`]: on every line the interval with the largest sum of +1 a solid and `-cost` an empty voxel (Kadane's
+///    maximum subarray, exact); what lies outside goes, what lies inside is filled as above. Loose
+///    pieces go as before.
+/// 5. Draft: from both ends towards `parting`, every value becomes at least the one before plus the tangent of the draft
 ///    times the step.
-/// 5. The surface is extracted and turned back.
+/// 6. The surface is extracted and turned back.
 ///
 /// # Errors
-/// [`MouldError::Grid`] when the part cannot be put on the grid, [`MouldError::Core`] for a core without an undercut; cancelled.
+/// [`MouldError::Grid`] when the part cannot be put on the grid, [`MouldError::Place`] for a place without an undercut; cancelled.
 pub fn repair(
     mesh: &TriMesh,
     draw: &Vec3,
     options: &RepairOptions,
     monitor: &Monitor,
 ) -> Result<Repaired, MouldError> {
-    let (frame, cell) = (axes(draw), options.cell);
-    let into = |p: &Vec3| Vec3::new(p.dot(&frame[0]), p.dot(&frame[1]), p.dot(&frame[2]));
-    let turned = turn(mesh, into);
-    let on_grid = RemeshOptions {
-        voxel: Some(cell),
-        min_tunnel: 0.0,
-        ..RemeshOptions::default()
-    };
-    let fail = |source: RemeshError| match source {
-        RemeshError::Cancelled(cancelled) => MouldError::Cancelled(cancelled),
-        source => MouldError::Grid { cell, source },
-    };
-    let mut field = remesh(&turned, &on_grid, monitor).map_err(fail)?.field;
-    let volume_before = volume(&field);
-    let open = fill_cores(&mut field, options, into)?;
+    let Laid {
+        frame,
+        mut field,
+        open,
+        volume: volume_before,
+    } = laid(mesh, draw, options, monitor)?;
     let before = multiple(&field);
+    remove_lesser(&mut field, &turned(&options.removals, &frame))?;
     match options.kind {
         Repair::Off => {}
-        Repair::Fill | Repair::Remove | Repair::Turn => fill(&mut field),
-        Repair::Keep => {
-            keep(&mut field, options.fill_cost);
-            if let Some((pieces, lost)) = drop_loose(&mut field) {
-                monitor.warn(
-                    STAGE,
-                    format!(
-                        "the repair cut off {pieces} pieces of {lost:.0} mm3, which are left out"
-                    ),
-                );
-            }
-        }
+        Repair::Fill | Repair::Remove | Repair::Turn | Repair::Best => fill(&mut field),
+        Repair::Keep => keep(&mut field, options.fill_cost),
+    }
+    if (options.kind == Repair::Keep || !options.removals.is_empty())
+        && let Some((pieces, lost)) = drop_loose(&mut field)
+    {
+        monitor.warn(
+            STAGE,
+            format!("the repair cut off {pieces} pieces of {lost:.0} mm3, which are left out"),
+        );
     }
     if options.draft > 0.0 {
         add_draft(
@@ -138,29 +140,95 @@ pub fn repair(
         values: field.values.iter().map(|f| 0.5 + f / h).collect(),
         ..field
     };
-    let out = remesh_density(&density, 0.5, &on_grid, monitor).map_err(fail)?;
-    let back = |p: &Vec3| p.x * frame[0] + p.y * frame[1] + p.z * frame[2];
+    let out = remesh_density(&density, 0.5, &grid(options.cell), monitor)
+        .map_err(|source| refused(source, options.cell))?;
     Ok(Repaired {
-        mesh: turn(out.solid.mesh(), back),
+        mesh: turn(out.solid.mesh(), |p| back(p, &frame)),
         volume: [volume_before, volume_after],
         multiple: [before, after],
     })
+}
+
+/// A part on voxels with the draw direction as z.
+pub(super) struct Laid {
+    frame: [Vec3; 3],
+    /// Signed distances; what cores make is material.
+    pub(super) field: VoxelGrid<f32>,
+    /// The voxels that cores make, and their own values.
+    open: Vec<(usize, f32)>,
+    /// Volume without the cores, mm3.
+    volume: f64,
+}
+
+impl Laid {
+    /// A point of the grid's frame as it lies in the part.
+    pub(super) fn back(&self, p: &Vec3) -> Vec3 {
+        back(p, &self.frame)
+    }
+}
+
+/// Turns a part so that the unit vector `draw` is z, and measures it on voxels.
+pub(super) fn laid(
+    mesh: &TriMesh,
+    draw: &Vec3,
+    options: &RepairOptions,
+    monitor: &Monitor,
+) -> Result<Laid, MouldError> {
+    let (frame, cell) = (axes(draw), options.cell);
+    let part = turn(mesh, |p| into(p, &frame));
+    let mut field = remesh(&part, &grid(cell), monitor)
+        .map_err(|source| refused(source, cell))?
+        .field;
+    let volume = volume(&field);
+    let open = fill_cores(&mut field, options, &frame)?;
+    Ok(Laid {
+        frame,
+        field,
+        open,
+        volume,
+    })
+}
+
+fn grid(cell: f64) -> RemeshOptions {
+    RemeshOptions {
+        voxel: Some(cell),
+        min_tunnel: 0.0,
+        ..RemeshOptions::default()
+    }
+}
+
+fn refused(source: RemeshError, cell: f64) -> MouldError {
+    match source {
+        RemeshError::Cancelled(cancelled) => MouldError::Cancelled(cancelled),
+        source => MouldError::Grid { cell, source },
+    }
+}
+
+fn into(p: &Vec3, frame: &[Vec3; 3]) -> Vec3 {
+    Vec3::new(p.dot(&frame[0]), p.dot(&frame[1]), p.dot(&frame[2]))
+}
+
+fn back(p: &Vec3, frame: &[Vec3; 3]) -> Vec3 {
+    p.x * frame[0] + p.y * frame[1] + p.z * frame[2]
+}
+
+fn turned(places: &[Vec3], frame: &[Vec3; 3]) -> Vec<Vec3> {
+    places.iter().map(|p| into(p, frame)).collect()
 }
 
 /// Makes material of what cores make; gives the values that were there.
 fn fill_cores(
     field: &mut VoxelGrid<f32>,
     options: &RepairOptions,
-    into: impl Fn(&Vec3) -> Vec3,
+    frame: &[Vec3; 3],
 ) -> Result<Vec<(usize, f32)>, MouldError> {
-    let places: Vec<Vec3> = options.cores.iter().map(&into).collect();
-    let turned = |bore: &Capsule| Capsule {
-        a: into(&bore.a),
-        b: into(&bore.b),
+    let along = |bore: &Capsule| Capsule {
+        a: into(&bore.a, frame),
+        b: into(&bore.b, frame),
         ..*bore
     };
-    let bores: Vec<Capsule> = options.bores.iter().map(turned).collect();
-    let cores = cored(field, &places, &bores)?;
+    let bores: Vec<Capsule> = options.bores.iter().map(along).collect();
+    let cores = cored(field, &turned(&options.cores, frame), &bores)?;
     let within = (0..cores.len()).filter(|&v| cores[v]);
     let open: Vec<(usize, f32)> = within.map(|v| (v, field.values[v])).collect();
     for (v, _) in &open {

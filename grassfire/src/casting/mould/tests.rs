@@ -199,5 +199,87 @@ fn a_core_keeps_its_undercut_open() {
         ..options
     };
     let refused = mould(&mesh, &nowhere, &Monitor::default());
-    assert!(matches!(refused, Err(MouldError::Core { distance }) if distance > 60.0));
+    assert!(
+        matches!(refused, Err(MouldError::Place { list: "cores", distance }) if distance > 60.0)
+    );
+}
+
+/// A box section along x, 60 mm long: 40 wide and 30 high outside, its upper flange 6 mm and all else 4 mm thick.
+fn box_section() -> TriMesh {
+    boxes(&[
+        [0.0, -20.0, 0.0, 60.0, 20.0, 4.0],
+        [0.0, -20.0, 24.0, 60.0, 20.0, 30.0],
+        [0.0, -20.0, 0.0, 60.0, -16.0, 30.0],
+        [0.0, 16.0, 0.0, 60.0, 20.0, 30.0],
+    ])
+}
+
+#[test]
+fn the_lesser_side_of_a_room_is_removed() {
+    let mesh = box_section();
+    let along_z = along([0.0, 0.0, 1.0]);
+    let asked = along_z.repair_options(15.0, 1.0);
+    let found = rooms(&mesh, &Vec3::z(), &asked, 50.0, &Monitor::default()).expect("a part");
+    let [room] = &found[..] else {
+        panic!("{found:?}");
+    };
+    let off = |value: f64, wanted: f64| (value / wanted - 1.0).abs();
+    assert!(off(room.volume, 60.0 * 32.0 * 20.0) < 0.08, "{room:?}");
+    // Voxels count whole: a layer more or less.
+    let layer = 60.0 * 32.0;
+    let thick = room.lesser / layer;
+    assert!((thick - 4.0).abs() < 1.0, "{room:?}");
+    assert!(
+        (room.place - Vec3::new(30.0, 0.0, 14.0)).norm() < 1.5,
+        "{room:?}"
+    );
+    let options = MouldOptions {
+        repair: Repair::Fill,
+        cell: Some(1.0),
+        removals: vec![room.place.into()],
+        ..along_z
+    };
+    let repaired = look(&mesh, &options).repaired.expect("asked for");
+    assert_eq!(repaired.multiple[1], 0);
+    // A channel is left: the thicker flange and the webs.
+    let wanted = 60.0 * (40.0 * 6.0 + 2.0 * 4.0 * 24.0);
+    assert!(off(repaired.volume[1], wanted) < 0.08, "{repaired:?}");
+    let nowhere = MouldOptions {
+        removals: vec![[30.0, 80.0, 16.0]],
+        ..options
+    };
+    let refused = mould(&mesh, &nowhere, &Monitor::default());
+    assert!(matches!(
+        refused,
+        Err(MouldError::Place {
+            list: "removals",
+            ..
+        })
+    ));
+}
+
+/// The free length of a bore ends in the air beside its lug. As material there it made a room above a base plate, which was filled.
+#[test]
+fn a_bore_is_a_core_only_where_it_is_undercut() {
+    let mesh = boxes(&[
+        [0.0, 0.0, 0.0, 60.0, 30.0, 4.0],
+        [0.0, 0.0, 0.0, 20.0, 30.0, 12.0],
+        [0.0, 0.0, 22.0, 20.0, 30.0, 30.0],
+        [0.0, 0.0, 0.0, 20.0, 10.0, 30.0],
+        [0.0, 20.0, 0.0, 20.0, 30.0, 30.0],
+    ]);
+    let mut asked = along([0.0, 0.0, 1.0]).repair_options(15.0, 1.0);
+    asked.kind = Repair::Fill;
+    asked.bores = vec![crate::remesh::Capsule {
+        a: Vec3::new(-20.0, 15.0, 17.0),
+        b: Vec3::new(60.0, 15.0, 17.0),
+        radius: 8.0,
+    }];
+    let monitor = Monitor::default();
+    let found = rooms(&mesh, &Vec3::z(), &asked, 10.0, &monitor).expect("a part");
+    assert_eq!(found, []);
+    let repaired = repair(&mesh, &Vec3::z(), &asked, &monitor).expect("a part");
+    let [before, after] = repaired.volume;
+    // The room would have had a fifth of the volume.
+    assert!((after / before - 1.0).abs() < 0.05, "{before} {after}");
 }
