@@ -114,6 +114,8 @@ fn reconstruct_help_is_complete() {
                                  (feed.growth)
           --draw <DX,DY,DZ>      Draw direction of the mould: the finished part is looked at along it
                                  (mould.draw, feed.draw)
+          --case <CASE>          Project file (TOML) whose loads tell which repair of undercuts is best
+                                 (for mould.repair=best)
           --strict               Refuse a mesh that needs repair (repair.strict)
       -o, --output <DIR>         Folder for the results; made when missing
           --set <KEY=VALUE>      Sets any option, such as remesh.min_tunnel=0; may be repeated
@@ -127,6 +129,7 @@ fn reconstruct_help_is_complete() {
       grassfire reconstruct part.stl -o out
       grassfire reconstruct part.stl --non-design bores.step --voxel 0.8 -o out
       grassfire reconstruct density.vti --iso 0.4 --set remesh.min_tunnel=0 -o out --json
+      grassfire reconstruct part.stl --draw 0,0,1 --set mould.repair=best --case case.toml -o out
     ");
 }
 

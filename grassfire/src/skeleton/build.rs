@@ -15,6 +15,8 @@ use super::polygons::Polygon;
 use super::quad_mesh::QuadMesh;
 use super::reduce::{collapse_short, prune_spurs};
 use super::reference::Reference;
+use super::shape_cost::settle;
+use super::split_chords::split_chords;
 use super::square::square_up;
 use super::tidy::Tidy;
 use super::walk::walk_triangles;
@@ -25,6 +27,9 @@ use crate::monitor::Monitor;
 use crate::topology::Betti;
 
 const STAGE: &str = "skeleton";
+
+/// Smoothing rounds after rows of quads were split.
+const SETTLE_ROUNDS: usize = 5;
 
 /// How the skeleton is meshed. Lengths without a unit are multiples of the local radius (half the thickness).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -38,6 +43,9 @@ pub struct SkeletonOptions {
     pub size_least: f64,
     /// Longest edge length over the part's median radius.
     pub size_most: f64,
+    /// Rows of quads are split in the end so that quads are this many times as short; no irregular vertex comes with them. 1
+    /// leaves the quads as laid out.
+    pub split: f64,
     /// Sheets narrower than this many radii become beams; 0 keeps them.
     pub member_width: f64,
     /// Sheets smaller than the square of this many radii become beams; 0 keeps them.
@@ -59,6 +67,7 @@ impl Default for SkeletonOptions {
             size_factor: 1.8,
             size_least: 2.0,
             size_most: 5.6,
+            split: 1.0,
             member_width: 1.2,
             member_size: 4.0,
             spur: 0.6,
@@ -85,6 +94,12 @@ impl SkeletonOptions {
         positive("skeleton.size_factor", self.size_factor)?;
         positive("skeleton.size_least", self.size_least)?;
         positive("skeleton.size_most", self.size_most)?;
+        inside(
+            (1.0..=8.0).contains(&self.split),
+            "skeleton.split",
+            self.split,
+            "1 to 8",
+        )?;
         not_negative("skeleton.member_width", self.member_width)?;
         not_negative("skeleton.member_size", self.member_size)?;
         not_negative("skeleton.spur", self.spur)?;
@@ -111,6 +126,7 @@ impl SkeletonOptions {
 /// 4. Make every sheet even, pair its triangles by maximum-weight matching, never across a seam; leftovers get a rim
 ///    vertex or meet by a triangle walk; doublets, bad diagonals and edges are cleaned up.
 /// 5. Anneal the quads toward few irregular vertices of the thickened body, rims and seams kept; square them up.
+/// 6. When asked, split every chord (row of quads, over all sheets of a seam) into strips: all new vertices are regular.
 ///
 /// The Betti numbers of `medial` are asserted after each phase. A point of `medial` that nothing uses counts as a
 /// component of its own (a ball). All faces are quads in every case; when a sheet resists, all faces are split in the
@@ -362,6 +378,14 @@ fn quads(
             (points, radii) = (better.points, better.radii);
         }
         square_up(&mut points, &mut radii, &polygons, &beams, reference);
+        if options.split > 1.0 {
+            let wanted = sizing.times(1.0 / options.split);
+            split_chords(&mut points, &mut radii, &mut polygons, reference, &wanted);
+            let mut m = QuadMesh::new(&points, &radii, &polygons, &beams);
+            settle(&mut m, reference, SETTLE_ROUNDS);
+            (points, radii) = (m.points, m.radii);
+            square_up(&mut points, &mut radii, &polygons, &beams, reference);
+        }
         whole = !has_twins(&polygons);
     }
     if !whole {

@@ -24,6 +24,15 @@ pub(crate) struct Sizing {
 }
 
 impl Sizing {
+    /// The same with lengths `factor` times as long.
+    pub fn times(&self, factor: f64) -> Self {
+        Self {
+            factor: self.factor * factor,
+            least: self.least * factor,
+            most: self.most * factor,
+        }
+    }
+
     /// Wanted length at a sphere of radius `r`.
     pub fn at(&self, r: f64) -> f64 {
         (self.factor * r).clamp(self.least, self.most)

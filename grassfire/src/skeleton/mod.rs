@@ -19,6 +19,7 @@ mod quad_moves;
 mod reduce;
 mod reference;
 mod shape_cost;
+mod split_chords;
 mod square;
 mod stats;
 mod tidy;

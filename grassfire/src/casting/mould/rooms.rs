@@ -63,7 +63,7 @@ pub fn rooms(
             out.push(Room {
                 place: part.back(&centre(v)),
                 volume,
-                lesser: lesser_side(field, &room).len() as f64 * cell,
+                lesser: solid(field, &lesser_side(field, &room)) as f64 * cell,
             });
         }
     }
@@ -84,6 +84,7 @@ pub(super) fn remove_lesser(field: &mut VoxelGrid<f32>, places: &[Vec3]) -> Resu
         flood(field, &empty, start, &mut room);
         going.extend(lesser_side(field, &room));
     }
+    // Empty voxels beside the surface, too: filling lifts what is above them to their value, which would count as material.
     let out = -0.5 * field.spacing as f32;
     for v in going {
         field.values[v] = field.values[v].min(out);
@@ -91,7 +92,12 @@ pub(super) fn remove_lesser(field: &mut VoxelGrid<f32>, places: &[Vec3]) -> Resu
     Ok(())
 }
 
-/// Material below or above a room on its lines, whichever is less.
+/// Voxels with material among these.
+fn solid(field: &VoxelGrid<f32>, voxels: &[usize]) -> usize {
+    voxels.iter().filter(|&&v| field.values[v] > 0.0).count()
+}
+
+/// What lies below or above a room on its lines, whichever has less material.
 fn lesser_side(field: &VoxelGrid<f32>, room: &[bool]) -> Vec<usize> {
     let [nx, ny, nz] = field.dims;
     let mut sides = [Vec::new(), Vec::new()];
@@ -103,13 +109,12 @@ fn lesser_side(field: &VoxelGrid<f32>, room: &[bool]) -> Vec<usize> {
             let (Some(first), Some(last)) = (first, last) else {
                 continue;
             };
-            let solid = |v: &usize| field.values[*v] > 0.0;
-            sides[0].extend((0..first).map(at).filter(solid));
-            sides[1].extend((last + 1..nz).map(at).filter(solid));
+            sides[0].extend((0..first).map(at));
+            sides[1].extend((last + 1..nz).map(at));
         }
     }
     let [below, above] = sides;
-    if above.len() < below.len() {
+    if solid(field, &above) < solid(field, &below) {
         above
     } else {
         below
