@@ -44,7 +44,7 @@ enum Way {
     Fill,
     Core,
     Remove,
-    Turn([Edit; 2]),
+    Turn(Box<[Edit; 2]>),
 }
 
 impl Way {
@@ -336,7 +336,7 @@ fn ways(
     let skeleton = skeleton_of(record, from, &job.options, monitor)?;
     for conflict in conflicts(&skeleton, draw, from.field.spacing) {
         if let Some(n) = between(&conflict, rooms) {
-            out[n].push(Way::Turn(conflict.turn));
+            out[n].push(Way::Turn(Box::new(conflict.turn)));
         }
     }
     Ok(out)

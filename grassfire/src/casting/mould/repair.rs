@@ -73,7 +73,7 @@ pub struct RepairOptions {
 pub struct Repaired {
     /// Its surface, mm.
     pub mesh: TriMesh,
-    /// Volume before and after on the same grid, mm3.
+    /// Volume of the surface before, on the same voxels, and after, mm3.
     pub volume: [f64; 2],
     /// Lines with more than one interval, before and after, on the voxels; cores count as material.
     pub multiple: [usize; 2],
@@ -133,7 +133,6 @@ pub fn repair(
     for (v, value) in open {
         field.values[v] = value;
     }
-    let volume_after = volume(&field);
     // As a density: 1/2 at the surface, one voxel up and down.
     let h = field.spacing as f32;
     let density = VoxelGrid {
@@ -144,7 +143,7 @@ pub fn repair(
         .map_err(|source| refused(source, options.cell))?;
     Ok(Repaired {
         mesh: turn(out.solid.mesh(), |p| back(p, &frame)),
-        volume: [volume_before, volume_after],
+        volume: [volume_before, out.solid.volume()],
         multiple: [before, after],
     })
 }
@@ -176,10 +175,8 @@ pub(super) fn laid(
 ) -> Result<Laid, MouldError> {
     let (frame, cell) = (axes(draw), options.cell);
     let part = turn(mesh, |p| into(p, &frame));
-    let mut field = remesh(&part, &grid(cell), monitor)
-        .map_err(|source| refused(source, cell))?
-        .field;
-    let volume = volume(&field);
+    let remeshed = remesh(&part, &grid(cell), monitor).map_err(|source| refused(source, cell))?;
+    let (mut field, volume) = (remeshed.field, remeshed.solid.volume());
     let open = fill_cores(&mut field, options, &frame)?;
     Ok(Laid {
         frame,
@@ -243,13 +240,6 @@ fn turn(mesh: &TriMesh, f: impl Fn(&Vec3) -> Vec3) -> TriMesh {
         triangles: mesh.triangles.clone(),
         tags: mesh.tags.clone(),
     }
-}
-
-fn volume(field: &VoxelGrid<f32>) -> f64 {
-    // A voxel at the surface counts by its share.
-    let h = field.spacing;
-    let share = |f: &f32| (0.5 + f64::from(*f) / h).clamp(0.0, 1.0);
-    field.values.iter().map(share).sum::<f64>() * h.powi(3)
 }
 
 /// Lines along z with more than one interval of material.

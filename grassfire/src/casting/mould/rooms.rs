@@ -84,7 +84,7 @@ pub(super) fn remove_lesser(field: &mut VoxelGrid<f32>, places: &[Vec3]) -> Resu
         flood(field, &empty, start, &mut room);
         going.extend(lesser_side(field, &room));
     }
-    // Empty voxels beside the surface, too: filling lifts what is above them to their value, which would count as material.
+    // Empty voxels beside the surface, too: filling lifts what is above them to their value, which moves walls nearby.
     let out = -0.5 * field.spacing as f32;
     for v in going {
         field.values[v] = field.values[v].min(out);
