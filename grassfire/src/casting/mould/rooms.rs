@@ -76,6 +76,9 @@ pub fn rooms(
 /// # Errors
 /// [`MouldError::Place`] for a place away from all undercuts.
 pub(super) fn remove_lesser(field: &mut VoxelGrid<f32>, places: &[Vec3]) -> Result<(), MouldError> {
+    if places.is_empty() {
+        return Ok(());
+    }
     let empty = undercut(field);
     let mut going = Vec::new();
     for place in places {
