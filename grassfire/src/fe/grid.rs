@@ -141,7 +141,21 @@ impl NodeGrid {
         components: usize,
         field: &'a mut [T],
     ) -> impl IndexedParallelIterator<Item = &'a mut [T]> {
-        let ends: Vec<usize> = self.planes.iter().map(|at| components * at).collect();
+        self.slabs(1, components, field)
+    }
+
+    /// The same for slabs of `thick` planes, of which the last may be thinner.
+    pub fn slabs<'a, T: Send>(
+        &self,
+        thick: usize,
+        components: usize,
+        field: &'a mut [T],
+    ) -> impl IndexedParallelIterator<Item = &'a mut [T]> {
+        let starts = self.planes[..=self.n[2]].iter().step_by(thick);
+        let ends: Vec<usize> = starts
+            .chain(self.planes.last())
+            .map(|at| components * at)
+            .collect();
         cut(field, &ends).into_par_iter()
     }
 }

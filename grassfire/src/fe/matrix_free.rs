@@ -4,24 +4,28 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use super::grid::NodeGrid;
-use super::kernel::Plane;
-use super::window::Window;
+use super::kernel::Slab;
+use super::parity::{Blocks, blocks};
+use super::rows::{Number, Rows};
+
+/// Planes of nodes that are worked on together; the layer of elements between two such slabs is multiplied twice.
+const SLAB: usize = 4;
 
 /// A float of the fine operator.
 pub(super) trait Float:
-    Copy + Default + PartialEq + PartialOrd + Send + Sync + Into<f64> + 'static
+    Number + PartialEq + PartialOrd + Send + Sync + Into<f64> + 'static
 {
     fn of(value: f64) -> Self;
-    /// One plane of the product with a field of numbers that need not be as precise.
-    fn plane<U: Copy + Into<Self>>(arch: Arch, plane: Plane<'_, Self, U>);
+    /// Some planes of the product with a field of numbers that need not be as precise.
+    fn slab<U: Copy + Into<Self>>(arch: Arch, slab: Slab<'_, Self, U>);
 }
 
 impl Float for f32 {
     fn of(value: f64) -> Self {
         value as f32
     }
-    fn plane<U: Copy + Into<Self>>(arch: Arch, plane: Plane<'_, Self, U>) {
-        arch.dispatch(plane);
+    fn slab<U: Copy + Into<Self>>(arch: Arch, slab: Slab<'_, Self, U>) {
+        arch.dispatch(slab);
     }
 }
 
@@ -29,21 +33,21 @@ impl Float for f64 {
     fn of(value: f64) -> Self {
         value
     }
-    fn plane<U: Copy + Into<Self>>(arch: Arch, plane: Plane<'_, Self, U>) {
-        arch.dispatch(plane);
+    fn slab<U: Copy + Into<Self>>(arch: Arch, slab: Slab<'_, Self, U>) {
+        arch.dispatch(slab);
     }
 }
 
 /// `K u` for given moduli.
 pub(super) struct MatrixFree<T> {
-    k: Box<[T; 576]>,
+    blocks: Blocks<T>,
     arch: Arch,
 }
 
 impl<T: Float> MatrixFree<T> {
     pub fn new(stiffness: &[[f64; 24]; 24]) -> Self {
         Self {
-            k: Box::new(std::array::from_fn(|i| T::of(stiffness[i / 24][i % 24]))),
+            blocks: blocks(stiffness).map(|x| x.map(|yz| yz.map(|r| r.map(T::of)))),
             arch: Arch::new(),
         }
     }
@@ -57,24 +61,22 @@ impl<T: Float> MatrixFree<T> {
         u: &[U],
         y: &mut [T],
     ) {
-        let windows = || (Window::new(grid, 3), Window::new(grid, 1));
-        grid.planes(3, y)
-            .enumerate()
-            .for_each_init(windows, |(near, around), (z, out)| {
-                near.clear();
-                around.clear();
-                let plane = Plane {
+        let slabs = grid.slabs(SLAB, 3, y).enumerate();
+        slabs.for_each_init(
+            || Rows::new(grid, SLAB + 2),
+            |rows, (i, out)| {
+                let slab = Slab {
                     grid,
-                    z,
+                    planes: i * SLAB..((i + 1) * SLAB).min(grid.n[2] + 1),
                     u,
                     e,
-                    k: &self.k,
-                    near,
-                    around,
+                    blocks: &self.blocks,
+                    rows,
                     out,
                 };
-                T::plane(self.arch, plane);
-            });
+                T::slab(self.arch, slab);
+            },
+        );
         hold(fixed, y);
     }
 }
