@@ -53,6 +53,8 @@ pub enum Command {
         #[arg(value_enum, default_value = "reconstruct")]
         of: SchemaOf,
     },
+    /// Prints the library of materials as a TOML file, to copy and change
+    Materials,
     /// Prints the version, and with --cite the papers behind it
     About(AboutArgs),
     /// Prints a completion script for a shell

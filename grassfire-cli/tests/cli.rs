@@ -60,6 +60,7 @@ fn help_names_the_commands() {
       mould        Looks at how a solid leaves its mould: undercuts, parting, draft, walls
       demo         Runs everything on a built-in example
       schema       Prints the JSON Schema of all options (the keys of --set)
+      materials    Prints the library of materials as a TOML file, to copy and change
       about        Prints the version, and with --cite the papers behind it
       completions  Prints a completion script for a shell
       man          Prints the manual page

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use nalgebra::Matrix3;
-
+use super::loads::{LoadPlace, exposed, forces_on};
 use super::select::Nodes;
 use super::shape::{Solid, any};
 use super::{Case, CaseError, Load, Shape, grid};
@@ -47,7 +46,8 @@ pub struct Built {
 /// 1. The grid is laid around the design space and the non-design bodies; its memory is estimated first.
 /// 2. A voxel belongs to a shape when its centre does. Bodies win over keep-outs, these over the space.
 /// 3. Selections become nodes. Where a selection meets non-design bodies, only their nodes are taken.
-/// 4. Loads are spread evenly over the nodes; moments by the least forces that give them.
+/// 4. Loads are spread over the nodes: forces evenly, moments by the least forces that give them, pressures and bearing forces over
+///    the faces of voxels towards the empty side.
 /// 5. Pieces that no support holds are taken out with a warning; the others must not be able to move.
 ///
 /// # Errors
@@ -145,7 +145,7 @@ pub fn build(case: &Case, folder: &Path, monitor: &Monitor) -> Result<Built, Cas
         ..Built::default()
     };
     let nodes = nodes(case, &problem, folder, &owned);
-    let (fixed, cases) = conditions(&nodes, problem.dims, &mut built.selections, monitor)?;
+    let (fixed, cases) = conditions(&nodes, &problem, &mut built.selections, monitor)?;
     problem.fixed = fixed;
     problem.cases = cases;
     hold(&mut problem, monitor)?;
@@ -174,7 +174,7 @@ pub(crate) fn conditions_on(
     drop(centres);
     let mut nodes = nodes(case, problem, folder, &bodies);
     nodes.slack = case.grid.h;
-    conditions(&nodes, problem.dims, &mut Vec::new(), monitor)
+    conditions(&nodes, problem, &mut Vec::new(), monitor)
 }
 
 /// For every non-design body which points lie in it.
@@ -258,11 +258,11 @@ pub(crate) type Fixed = Vec<([usize; 3], usize)>;
 /// Supports and load cases on nodes.
 fn conditions(
     nodes: &Nodes,
-    dims: [usize; 3],
+    problem: &Problem,
     infos: &mut Vec<SelectionInfo>,
     monitor: &Monitor,
 ) -> Result<(Fixed, Vec<LoadCase>), CaseError> {
-    let counts = dims.map(|n| n + 1);
+    let counts = problem.dims.map(|n| n + 1);
     let at = |i: usize| {
         [
             i % counts[0],
@@ -284,7 +284,7 @@ fn conditions(
         let mut forces = Vec::new();
         for load in &table.loads {
             let found = resolve(nodes, &load.on, "load", infos, monitor)?;
-            let spread = spread(nodes, &found, load)?;
+            let spread = spread(nodes, problem, &found, load)?;
             forces.extend(found.iter().map(|&i| at(i)).zip(spread));
         }
         cases.push(LoadCase {
@@ -354,37 +354,28 @@ fn mean(nodes: &Nodes, of: &[usize]) -> Vec3 {
 }
 
 /// The force on every node of a load.
-fn spread(nodes: &Nodes, found: &[usize], load: &Load) -> Result<Vec<[f64; 3]>, CaseError> {
-    let places: Vec<(Vec3, f64)> = found.iter().map(|&i| (nodes.places[i], 1.0)).collect();
-    let forces = spread_evenly(&places, load)?;
+fn spread(
+    nodes: &Nodes,
+    problem: &Problem,
+    found: &[usize],
+    load: &Load,
+) -> Result<Vec<[f64; 3]>, CaseError> {
+    let areas = if load.pressure.is_some() || load.bearing.is_some() {
+        exposed(problem, found)
+    } else {
+        vec![Vec3::zeros(); found.len()]
+    };
+    let places: Vec<LoadPlace> = found
+        .iter()
+        .zip(areas)
+        .map(|(&i, area)| LoadPlace {
+            place: nodes.places[i],
+            weight: 1.0,
+            area,
+        })
+        .collect();
+    let forces = forces_on(&places, load)?;
     Ok(forces.into_iter().map(Into::into).collect())
-}
-
-/// Forces on weighted places: shares of the force by weight, and for a moment the smallest forces that make it.
-pub(super) fn spread_evenly(places: &[(Vec3, f64)], load: &Load) -> Result<Vec<Vec3>, CaseError> {
-    let total: f64 = places.iter().map(|(_, w)| w).sum();
-    let force = Vec3::from(load.force.unwrap_or_default());
-    let mut out: Vec<Vec3> = places.iter().map(|(_, w)| force * (w / total)).collect();
-    if let Some(moment) = load.moment.filter(|m| *m != [0.0; 3]) {
-        let centre = places.iter().map(|(p, w)| p * *w).sum::<Vec3>() / total;
-        let inertia: Matrix3<f64> = places
-            .iter()
-            .map(|(p, w)| (p - centre, w))
-            .map(|(r, w)| (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * *w)
-            .sum();
-        let size = inertia.trace();
-        let sound = inertia.symmetric_eigenvalues().min() > 1e-9 * size;
-        let Some(inverse) = inertia.try_inverse().filter(|_| sound) else {
-            return Err(CaseError::Moment {
-                name: load.on.clone(),
-                nodes: places.len(),
-            });
-        };
-        let turn = inverse * Vec3::from(moment);
-        let arms = places.iter().map(|(p, w)| turn.cross(&(p - centre)) * *w);
-        out.iter_mut().zip(arms).for_each(|(f, more)| *f += more);
-    }
-    Ok(out)
 }
 
 /// Takes out the pieces that no support holds; refuses those that can move or carry a load.

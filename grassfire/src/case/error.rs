@@ -58,6 +58,10 @@ pub enum CaseError {
     },
     #[error("the moment on {name:?} cannot be spread over its {nodes} nodes: they lie on a line")]
     Moment { name: String, nodes: usize },
+    #[error(
+        "the pressure or bearing force on {name:?} finds no surface that faces it among its {points} points"
+    )]
+    NoSurface { name: String, points: usize },
     #[error("the supports leave the part free: {}", modes.join(", "))]
     Mechanism { modes: Vec<&'static str> },
     #[error(
@@ -108,6 +112,9 @@ impl CaseError {
             }
             Self::OnVoid { .. } => Some("move it onto the design space or a non-design body".into()),
             Self::Moment { .. } => Some("select a face instead of an edge".into()),
+            Self::NoSurface { .. } => Some(
+                "select the whole surface that is pressed, such as a bore by its cylinder; a bearing force acts across the bore".into(),
+            ),
             Self::Mechanism { .. } => Some("fix more directions, or at more places".into()),
             Self::LooseLoad { .. } => Some("join the pieces of the design space, or use a finer grid.h".into()),
             Self::BodyOutside { .. } => Some("check its place and unit".into()),

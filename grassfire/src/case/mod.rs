@@ -5,6 +5,8 @@
 mod build;
 mod error;
 mod grid;
+mod loads;
+mod materials;
 mod places;
 mod select;
 mod shape;
@@ -22,7 +24,9 @@ pub use build::{Built, SelectionInfo, build};
 pub(crate) use build::{conditions_on, in_bodies};
 pub use error::CaseError;
 pub(crate) use grid::place as place_grid;
-pub(crate) use places::{Places, forces_on};
+pub(crate) use loads::{LoadPlace, forces_on};
+pub use materials::LIBRARY;
+pub(crate) use places::Places;
 pub use select::Selector;
 pub use shape::Shape;
 
@@ -81,12 +85,14 @@ pub struct GridOptions {
     pub origin: Option<[f64; 3]>,
 }
 
-/// An isotropic, linear elastic material.
+/// An isotropic, linear elastic material: its values, or the name of one in a library (`grassfire materials`).
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Material {
     /// Name.
     pub name: String,
+    /// A library of your own, relative to the project file; without: that of the program.
+    pub library: Option<String>,
     /// Young's modulus, MPa.
     pub young: f64,
     /// Poisson's ratio.
@@ -165,16 +171,20 @@ impl Default for LoadCaseTable {
     }
 }
 
-/// A load, spread evenly over the nodes of a selection.
+/// A load on a selection; its kinds add up.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Load {
     /// Selection.
     pub on: String,
-    /// Total force, N.
+    /// Total force, N; spread evenly.
     pub force: Option<[f64; 3]>,
     /// Moment about the centre of the selection, N mm.
     pub moment: Option<[f64; 3]>,
+    /// Pressure on the surface, MPa. In the optimization it stays on the faces of the design space and the bodies.
+    pub pressure: Option<f64>,
+    /// Total force, N, that a pin presses with on the wall of a bore: with the cosine, on the half that faces it.
+    pub bearing: Option<[f64; 3]>,
 }
 
 impl Case {
@@ -185,15 +195,17 @@ impl Case {
     pub fn read(path: &Path) -> Result<Self, CaseError> {
         let bytes = crate::io::read_file(path, 1 << 24)?;
         let text = String::from_utf8_lossy(&bytes);
-        Self::parse(&path.display().to_string(), &text)
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::parse(&path.display().to_string(), &text, folder)
     }
 
-    /// [`Case::read`] on a text; `name` stands in messages.
+    /// [`Case::read`] on a text; `name` stands in messages, and paths begin in `folder`.
     ///
     /// # Errors
     /// As [`Case::read`].
-    pub fn parse(name: &str, text: &str) -> Result<Self, CaseError> {
-        let case: Self = toml::from_str(text).map_err(|e| error::syntax(name, text, &e))?;
+    pub fn parse(name: &str, text: &str, folder: &Path) -> Result<Self, CaseError> {
+        let mut case: Self = toml::from_str(text).map_err(|e| error::syntax(name, text, &e))?;
+        materials::complete(&mut case.material, folder)?;
         case.check()?;
         Ok(case)
     }
@@ -270,12 +282,19 @@ impl Case {
         for (j, load) in case.loads.iter().enumerate() {
             let key = |what: &str| format!("case[{i}].loads[{j}].{what}");
             self.find(&load.on, &key("on"))?;
-            for (what, vector) in [("force", load.force), ("moment", load.moment)] {
+            for (what, vector) in [
+                ("force", load.force),
+                ("moment", load.moment),
+                ("bearing", load.bearing),
+            ] {
                 finite(&key(what), vector.iter().flatten())?;
             }
             let none = |v: Option<[f64; 3]>| v.is_none_or(|v| v == [0.0; 3]);
-            if none(load.force) && none(load.moment) {
-                return Err(value(&key("force"), "0", "a force or a moment"));
+            finite(&key("pressure"), &load.pressure)?;
+            let vectors = [load.force, load.moment, load.bearing];
+            if vectors.into_iter().all(none) && load.pressure.is_none_or(|p| p == 0.0) {
+                let wanted = "a force, a moment, a pressure or a bearing force";
+                return Err(value(&key("force"), "0", wanted));
             }
         }
         Ok(())

@@ -1,10 +1,10 @@
-//! Selections and loads on points that are no nodes: the surface of a finished part.
+//! Selections of points that are no nodes: the surface of a finished part.
 
 use std::path::Path;
 
-use super::build::{in_bodies, spread_evenly};
+use super::build::in_bodies;
 use super::select::Nodes;
-use super::{Case, CaseError, Load, Selector};
+use super::{Case, CaseError, Selector};
 use crate::Vec3;
 use crate::monitor::Monitor;
 
@@ -54,14 +54,6 @@ impl<'a> Places<'a> {
         let found = self.nodes.select(selector, monitor)?;
         Ok((0..found.len()).filter(|&i| found[i]).collect())
     }
-}
-
-/// The forces of a load on points with weights (areas): even by weight, N.
-///
-/// # Errors
-/// [`CaseError::Moment`] when the points lie on a line and a moment is asked for.
-pub(crate) fn forces_on(places: &[(Vec3, f64)], load: &Load) -> Result<Vec<Vec3>, CaseError> {
-    spread_evenly(places, load)
 }
 
 /// For every body which points lie in it or no farther than `slack` away along an axis: points of a surface that a part

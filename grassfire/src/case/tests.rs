@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::*;
+use crate::Vec3;
 use crate::fe::FeError;
 use crate::monitor::Monitor;
 use crate::topopt::{CORE, DESIGN, FROZEN, OUTSIDE, TopoptError, validate};
@@ -34,7 +35,7 @@ volume_fraction = 0.5
 "#;
 
 fn try_build(text: &str) -> Result<Built, CaseError> {
-    let case = Case::parse("case.toml", text)?;
+    let case = Case::parse("case.toml", text, Path::new("."))?;
     let built = build(&case, Path::new("."), &Monitor::default())?;
     validate(&built.problem, &case.optimize, &case.solver)?;
     Ok(built)
@@ -110,6 +111,60 @@ fn bad_cases_are_refused_by_name() {
     assert!(matches!(e, CaseError::MissingFile { .. }), "{e}");
     let e = broken("{ on = \"ring\", force", "{ on = \"corner\", moment");
     assert!(matches!(e, CaseError::Moment { .. }), "{e}");
+}
+
+#[test]
+fn a_material_is_found_by_name_and_an_own_library_wins() {
+    let values = "young = 1000.0\nnu = 0.3";
+    let read = |material: &str, folder: &Path| {
+        Case::parse("case.toml", &GOOD.replace(values, material), folder).map(|c| c.material)
+    };
+    let here = Path::new(".");
+    let found = read("name = \"EN-GJS-400-15\"\nyield_strength = 240.0", here).unwrap();
+    assert_eq!((found.young, found.nu), (169_000.0, 0.275));
+    assert_eq!(found.yield_strength, Some(240.0));
+    assert_eq!(found.source, "EN 1563");
+    let e = read("name = \"EN-GJS-400-51\"", here).unwrap_err();
+    assert!(e.hint().is_some_and(|h| h.contains("EN-GJS-400-15")), "{e}");
+    let folder = tempfile::tempdir().unwrap();
+    let own = "[wood]\nyoung = 1e4\nnu = 0.3\nsource = \"a guess\"\n";
+    std::fs::write(folder.path().join("own.toml"), own).unwrap();
+    let wood = "name = \"wood\"\nlibrary = \"own.toml\"";
+    assert_eq!(read(wood, folder.path()).unwrap().young, 1e4);
+    assert!(matches!(read(wood, here), Err(CaseError::Io(_))));
+    let both = format!("{wood}\n{values}");
+    assert!(matches!(
+        read(&both, folder.path()),
+        Err(CaseError::Value { .. })
+    ));
+}
+
+#[test]
+fn a_pressure_presses_every_face_of_a_wall_once() {
+    let pressed = |pressure: &str| {
+        let text = GOOD.replace("on = \"ring\", force = [100, 0, 0]", pressure);
+        let text = text.replace(
+            "corner = {",
+            "right = { plane = { point = [20, 0, 0], normal = [1, 0, 0] } }\ncorner = {",
+        );
+        let text = text.replace("point = [16, 5, 0]", "point = [10, 5, 0]");
+        try_build(&text).unwrap().problem.cases[0]
+            .forces
+            .iter()
+            .map(|(_, f)| Vec3::from(*f))
+            .collect::<Vec<_>>()
+    };
+    // 10 x 10 mm under 3 MPa; a corner node has a quarter of a voxel's face of 2 x 2 mm.
+    let forces = pressed("on = \"right\", pressure = 3");
+    let sum: Vec3 = forces.iter().sum();
+    assert!((sum - Vec3::new(-300.0, 0.0, 0.0)).norm() < 1e-9, "{sum}");
+    let least = forces
+        .iter()
+        .map(|f| f.norm())
+        .fold(f64::INFINITY, f64::min);
+    assert!((least - 3.0).abs() < 1e-9, "{least}");
+    let sum: Vec3 = pressed("on = \"right\", bearing = [-7, 0, 0]").iter().sum();
+    assert!((sum - Vec3::new(-7.0, 0.0, 0.0)).norm() < 1e-9, "{sum}");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::element::triangle_shape;
 use super::{TetError, TetLoads, TetMesh, TetModel};
 use crate::Vec3;
-use crate::case::{Case, LoadCaseTable, Places, forces_on};
+use crate::case::{Case, LoadCaseTable, LoadPlace, Places, forces_on};
 use crate::monitor::Monitor;
 
 /// Tolerances of selections, as a share of the mean edge on the boundary: its nodes lie on the exact surface.
@@ -139,8 +139,10 @@ impl Site<'_> {
                 .iter()
                 .flat_map(|f| quadrature(self.mesh, f))
                 .collect();
-            let places: Vec<(Vec3, f64)> =
-                points.iter().map(|p| (p.place, p.area.norm())).collect();
+            let places: Vec<LoadPlace> = points
+                .iter()
+                .map(|p| LoadPlace::on_surface(p.place, p.area))
+                .collect();
             for (point, force) in points.iter().zip(forces_on(&places, load)?) {
                 for (&node, shape) in point.face.iter().zip(point.shape) {
                     *sums.entry(node).or_default() += shape * force;

@@ -275,7 +275,7 @@ loads = [{ on = "right", moment = [300.0, 0.0, 0.0] }]
 [optimize]
 volume_fraction = 0.5
 "#;
-    let case = Case::parse("case.toml", text).expect("a case");
+    let case = Case::parse("case.toml", text, Path::new(".")).expect("a case");
     let mesh = crooked();
     let model = model(&case, Path::new("."), &mesh, &Monitor::default()).expect("a model");
     let sum: Vec3 = model.cases[0].forces.iter().map(|(_, f)| f).sum();

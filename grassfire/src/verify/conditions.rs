@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::{Fractions, STAGE, VerifyError};
 use crate::Vec3;
-use crate::case::{Case, LoadCaseTable, Places, forces_on};
+use crate::case::{Case, LoadCaseTable, LoadPlace, Places, forces_on};
 use crate::fe::components;
 use crate::mesh::{Bvh, TriMesh};
 use crate::monitor::Monitor;
@@ -71,11 +71,11 @@ impl ActiveNodes {
     }
 }
 
-/// The surface in small pieces: centres and areas.
+/// The surface in small pieces: centres, and areas times outward normals.
 pub(super) struct Pieces {
     mesh: TriMesh,
     centres: Vec<Vec3>,
-    areas: Vec<f64>,
+    areas: Vec<Vec3>,
 }
 
 impl Pieces {
@@ -85,7 +85,7 @@ impl Pieces {
         let corners = (0..mesh.triangles.len()).map(|t| mesh.corners(t));
         let centres = corners.clone().map(|[a, b, c]| (a + b + c) / 3.0).collect();
         let areas = corners
-            .map(|[a, b, c]| (b - a).cross(&(c - a)).norm() / 2.0)
+            .map(|[a, b, c]| (b - a).cross(&(c - a)) / 2.0)
             .collect();
         Self {
             mesh,
@@ -94,19 +94,20 @@ impl Pieces {
         }
     }
 
-    /// Points on all pieces with weights.
+    /// Points on all pieces.
     #[cfg(test)]
-    pub fn all(&self) -> Vec<(Vec3, f64)> {
+    pub fn all(&self) -> Vec<LoadPlace> {
         self.of(&(0..self.centres.len()).collect::<Vec<_>>())
     }
 
-    /// Points on some pieces with weights, mm2: three a piece, exact for quadratic functions, as products of the weights of
+    /// Points on some pieces, weighed by area: three a piece, exact for quadratic functions, as products of the weights of
     /// nodes are in a voxel's face.
-    fn of(&self, chosen: &[usize]) -> Vec<(Vec3, f64)> {
+    fn of(&self, chosen: &[usize]) -> Vec<LoadPlace> {
         let points = |&i: &usize| {
             let corners = self.mesh.corners(i);
-            let weight = self.areas[i] / 3.0;
-            corners.map(|c| (self.centres[i] + (c - self.centres[i]) / 2.0, weight))
+            let area = self.areas[i] / 3.0;
+            corners
+                .map(|c| LoadPlace::on_surface(self.centres[i] + (c - self.centres[i]) / 2.0, area))
         };
         chosen.iter().flat_map(points).collect()
     }
@@ -215,10 +216,15 @@ impl Site<'_> {
             if places.is_empty() {
                 let nodes = node_places(grid, active);
                 let found = self.nodes_instead(&load.on, "load", &nodes, grid.h)?;
-                places = found.iter().map(|&i| (nodes[i], 1.0)).collect();
+                let at_node = |&i: &usize| LoadPlace {
+                    place: nodes[i],
+                    weight: 1.0,
+                    area: Vec3::zeros(),
+                };
+                places = found.iter().map(at_node).collect();
             }
-            let first = places[0].0;
-            places.retain(|(p, _)| !weights(grid, active, p).is_empty());
+            let first = places[0].place;
+            places.retain(|p| !weights(grid, active, &p.place).is_empty());
             if places.is_empty() {
                 return Err(VerifyError::LooseLoad {
                     name: table.name.clone(),
@@ -306,12 +312,12 @@ pub(super) fn weights(grid: &Fractions, active: &ActiveNodes, p: &Vec3) -> Vec<(
 pub(super) fn spread(
     grid: &Fractions,
     active: &ActiveNodes,
-    places: &[(Vec3, f64)],
+    places: &[LoadPlace],
     forces: &[Vec3],
     sums: &mut BTreeMap<[usize; 3], Vec3>,
 ) {
-    for ((p, _), force) in places.iter().zip(forces) {
-        for ([x, y, z], weight) in weights(grid, active, p) {
+    for (p, force) in places.iter().zip(forces) {
+        for ([x, y, z], weight) in weights(grid, active, &p.place) {
             *sums.entry([z, y, x]).or_default() += weight * force;
         }
     }

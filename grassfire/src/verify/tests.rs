@@ -6,6 +6,7 @@ use nalgebra::{Rotation3, Unit};
 
 use super::conditions::{ActiveNodes, Conditions, Pieces, spread};
 use super::*;
+use crate::case::{Load, LoadPlace, forces_on};
 use crate::mesh::shapes;
 use crate::remesh::split_long_edges;
 
@@ -92,18 +93,18 @@ fn loads_on_the_surface_keep_force_and_moment() {
     let active = ActiveNodes::new(&grid);
     let pieces = Pieces::new(&mesh, grid.h);
     let places = pieces.all();
-    let area: f64 = places.iter().map(|(_, a)| a).sum();
+    let area: f64 = places.iter().map(|p| p.weight).sum();
     assert!((area / mesh.area() - 1.0).abs() < 1e-10, "{area}");
     let forces: Vec<Vec3> = places
         .iter()
-        .map(|(p, a)| Vec3::new(p.y, 1.0, -p.x * p.z) * *a)
+        .map(|p| Vec3::new(p.place.y, 1.0, -p.place.x * p.place.z) * p.weight)
         .collect();
     let mut sums = BTreeMap::new();
     spread(&grid, &active, &places, &forces, &mut sums);
     let (mut force, mut moment, mut size) = (Vec3::zeros(), Vec3::zeros(), 0.0);
-    for ((p, _), f) in places.iter().zip(&forces) {
+    for (p, f) in places.iter().zip(&forces) {
         force += f;
-        moment += p.cross(f);
+        moment += p.place.cross(f);
         size += f.norm();
     }
     for ([z, y, x], f) in &sums {
@@ -142,7 +143,7 @@ volume_fraction = 0.5
         x = size[0],
         h = size[2] / 8.0
     );
-    Case::parse("case.toml", &text).unwrap()
+    Case::parse("case.toml", &text, Path::new(".")).unwrap()
 }
 
 /// Beam theory with shear; no Poisson's ratio, so that the clamp does not stiffen.
@@ -237,15 +238,16 @@ fn turned_cylinder_under_pressure_is_right() {
             let r = p - centre;
             r - axis * r.dot(&axis)
         };
-        let bore: Vec<(Vec3, f64)> = pieces
+        let bore: Vec<LoadPlace> = pieces
             .all()
             .into_iter()
-            .filter(|(p, _)| radial(p).norm() < inner + 0.01)
+            .filter(|p| radial(&p.place).norm() < inner + 0.01)
             .collect();
-        let forces: Vec<Vec3> = bore
-            .iter()
-            .map(|(p, a)| radial(p).normalize() * (pressure * a))
-            .collect();
+        let load = Load {
+            pressure: Some(pressure),
+            ..Load::default()
+        };
+        let forces = forces_on(&bore, &load).unwrap();
         let mut sums = BTreeMap::new();
         spread(&grid, &active, &bore, &forces, &mut sums);
         let loads = sums.into_iter().map(|([z, y, x], f)| ([x, y, z], f.into()));
