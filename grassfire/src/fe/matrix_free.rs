@@ -87,3 +87,87 @@ pub(super) fn hold<T: Copy + Default>(fixed: &[usize], field: &mut [T]) {
         field[dof] = T::default();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::element;
+    use super::*;
+
+    /// `K u` element by element; fields `[component][z][y][x]` of all nodes.
+    fn by_elements(n: [usize; 3], moduli: &[f64], u: &[Vec<f64>; 3]) -> [Vec<f64>; 3] {
+        let k = element::stiffness(0.3);
+        let node = |x: usize, y: usize, z: usize| (z * (n[1] + 1) + y) * (n[0] + 1) + x;
+        let mut out = u.clone().map(|c| vec![0.0; c.len()]);
+        for (i, e) in moduli.iter().enumerate() {
+            let [x, y, z] = [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])];
+            let nodes: [usize; 8] =
+                std::array::from_fn(|c| node(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)));
+            for (r, row) in k.iter().enumerate() {
+                let force: f64 = (0..24).map(|c| row[c] * u[c % 3][nodes[c / 3]]).sum();
+                out[r % 3][nodes[r / 3]] += e * force;
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn forces_of_a_slab_do_not_leak_into_the_next_one() {
+        // Rows of one and of several runs, an empty layer, 22 planes; one thread goes from slab to slab with the same rows.
+        let n = [37, 6, 21];
+        let moduli: Vec<f64> = (0..n.iter().product())
+            .map(|i| {
+                let [x, y, z] = [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])];
+                let empty = z == 9 || (12..25).contains(&x) && y > 1 || (y + z) % 5 == 4;
+                if empty {
+                    0.0
+                } else {
+                    1.0 + ((7 * i) % 11) as f64
+                }
+            })
+            .collect();
+        let occupied: Vec<bool> = moduli.iter().map(|e| *e > 0.0).collect();
+        let grid = NodeGrid::new(n, &occupied);
+        let (mut e, mut u) = (grid.scalar::<f64>(), grid.field::<f64>());
+        let counts = n.map(|n| n + 1);
+        let mut full = [(); 3].map(|()| vec![0.0; counts.iter().product()]);
+        let nodes: Vec<[usize; 3]> = (0..full[0].len())
+            .map(|i| {
+                [
+                    i % counts[0],
+                    i / counts[0] % counts[1],
+                    i / (counts[0] * counts[1]),
+                ]
+            })
+            .collect();
+        for (i, &at) in nodes.iter().enumerate() {
+            let Some(place) = grid.place(at) else {
+                continue;
+            };
+            if (0..3).all(|d| at[d] < n[d]) {
+                e[grid.first(at[2]) + place] = moduli[(at[2] * n[1] + at[1]) * n[0] + at[0]];
+            }
+            for c in 0..3 {
+                full[c][i] = ((13 * i + 5 * c) % 29) as f64 / 29.0;
+                u[grid.node(at, c).unwrap()] = full[c][i];
+            }
+        }
+        let wanted = by_elements(n, &moduli, &full);
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build()
+            .unwrap();
+        let product = MatrixFree::<f64>::new(&element::stiffness(0.3));
+        let mut y = grid.field();
+        pool.install(|| product.apply(&grid, &e, &[], &u, &mut y));
+        for (i, &at) in nodes.iter().enumerate() {
+            for c in 0..3 {
+                let found = grid.node(at, c).map_or(0.0, |place| y[place]);
+                assert!(
+                    (found - wanted[c][i]).abs() < 1e-13,
+                    "{at:?} {c}: {found} {}",
+                    wanted[c][i]
+                );
+            }
+        }
+    }
+}

@@ -46,6 +46,7 @@ struct Level {
     coefficients: Vec<(f32, f32)>,
     /// Approximate eigenvector of the largest eigenvalue; empty on the finest level, whose elements bound it.
     probe: Vec<f32>,
+    /// Right side; empty on the finest level, where it is the residual of the conjugate gradients.
     b: Vec<f32>,
     x: Vec<f32>,
     d: Vec<f32>,
@@ -126,12 +127,11 @@ impl Multigrid {
 
     /// One cycle for the residual `r`; the result is [`Multigrid::result`].
     pub fn cycle(&mut self, fine: Fine, r: &[f64]) {
-        let b = match self.levels.first_mut() {
-            Some(level) => &mut level.b,
-            None => &mut self.coarse_b,
-        };
-        b.par_iter_mut().zip(r).for_each(|(to, &v)| *to = v as f32);
-        self.solve(fine, 0);
+        if self.levels.is_empty() {
+            let b = self.coarse_b.iter_mut().zip(r);
+            b.for_each(|(to, &v)| *to = v as f32);
+        }
+        self.solve(fine, r, 0);
     }
 
     /// The correction of the last [`Multigrid::cycle`].
@@ -139,13 +139,13 @@ impl Multigrid {
         self.levels.first().map_or(&self.coarse_x, |level| &level.x)
     }
 
-    fn solve(&mut self, finest: Fine, l: usize) {
+    fn solve(&mut self, finest: Fine, r: &[f64], l: usize) {
         if l == self.levels.len() {
             self.coarse.solve(&self.coarse_b, &mut self.coarse_x);
             return;
         }
         let level = &mut self.levels[l];
-        level.smooth(finest, true);
+        level.smooth(finest, r, true);
         for _ in 0..if l == 0 { 1 } else { VISITS } {
             self.levels[l].apply_x(finest);
             let (above, below) = self.levels.split_at_mut(l + 1);
@@ -154,8 +154,12 @@ impl Multigrid {
                 Some(next) => (&next.grid, &mut next.b),
                 None => (&self.coarsest, &mut self.coarse_b),
             };
-            transfer::restrict(&fine.grid, &fine.b, &fine.t, grid, b);
-            self.solve(finest, l + 1);
+            if l == 0 {
+                transfer::restrict(&fine.grid, r, &fine.t, grid, b);
+            } else {
+                transfer::restrict(&fine.grid, &fine.b, &fine.t, grid, b);
+            }
+            self.solve(finest, r, l + 1);
             let (above, below) = self.levels.split_at_mut(l + 1);
             let fine = &mut above[l];
             let (grid, x) = match below.first() {
@@ -167,7 +171,7 @@ impl Multigrid {
                 hold(&finest.frame.fixed, &mut fine.x);
             }
         }
-        self.levels[l].smooth(finest, false);
+        self.levels[l].smooth(finest, r, false);
     }
 }
 
@@ -186,7 +190,7 @@ impl Level {
             diagonal,
             coefficients: Vec::new(),
             probe,
-            b: grid.field(),
+            b: if l == 0 { Vec::new() } else { grid.field() },
             x: grid.field(),
             d: grid.field(),
             t: grid.field(),
@@ -202,29 +206,25 @@ impl Level {
         }
     }
 
-    /// A Chebyshev sweep; `from_zero` when x is still to be made.
-    fn smooth(&mut self, fine: Fine, from_zero: bool) {
+    /// A Chebyshev sweep; `r`: right side of the finest level; `from_zero` when x is still to be made.
+    fn smooth(&mut self, fine: Fine, r: &[f64], from_zero: bool) {
         for i in 0..self.coefficients.len() {
             let zero = from_zero && i == 0;
             if !zero {
                 self.apply_x(fine);
             }
             let vectors = Vectors {
-                b: &self.b,
                 t: &self.t,
                 x: &mut self.x,
                 d: &mut self.d,
             };
-            smoother::step(
-                &self.grid,
-                &self.diagonal,
-                vectors,
-                zero,
-                self.coefficients[i],
-            );
+            let factors = self.coefficients[i];
             if matches!(self.operator, Operator::Fine(_)) {
+                smoother::step(&self.grid, &self.diagonal, r, vectors, zero, factors);
                 hold(&fine.frame.fixed, &mut self.d);
                 hold(&fine.frame.fixed, &mut self.x);
+            } else {
+                smoother::step(&self.grid, &self.diagonal, &self.b, vectors, zero, factors);
             }
         }
     }

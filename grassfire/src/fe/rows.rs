@@ -178,24 +178,27 @@ impl<T: Number> Rows<T> {
         }
     }
 
-    /// Adds the forces on row y to the planes that the result has, and clears them.
+    /// Adds the forces on row y to the planes that the result has, and clears those of all planes: another slab has other
+    /// planes in their places.
     #[inline(always)]
     pub fn add_to(&mut self, grid: &NodeGrid, y: usize, planes: &Range<usize>, out: &mut [T]) {
         if self.held[y % 2] != Some(y) {
             return;
         }
-        for z in planes.clone() {
-            let plane = 3 * (grid.first(z) - grid.first(planes.start));
+        for z in self.z..self.z + self.planes {
             for c in 0..3 {
                 let row = number(z - self.z, y, c, 0);
-                let (sum, difference) = (self.forces.row(row), self.forces.row(row + 1));
-                for run in grid.row(y, z) {
-                    let (at, before) = (BLOCK + run.x, BLOCK + run.x - 1);
-                    let here = sum[at..].iter().zip(&difference[at..]);
-                    let there = sum[before..].iter().zip(&difference[before..]);
-                    let to = &mut out[plane + c * grid.count(z) + run.at..][..run.len];
-                    for (to, ((&s, &d), (&t, &e))) in to.iter_mut().zip(here.zip(there)) {
-                        *to = (s + d) + (t - e);
+                if planes.contains(&z) {
+                    let plane = 3 * (grid.first(z) - grid.first(planes.start));
+                    let (sum, difference) = (self.forces.row(row), self.forces.row(row + 1));
+                    for run in grid.row(y, z) {
+                        let (at, before) = (BLOCK + run.x, BLOCK + run.x - 1);
+                        let here = sum[at..].iter().zip(&difference[at..]);
+                        let there = sum[before..].iter().zip(&difference[before..]);
+                        let to = &mut out[plane + c * grid.count(z) + run.at..][..run.len];
+                        for (to, ((&s, &d), (&t, &e))) in to.iter_mut().zip(here.zip(there)) {
+                            *to = (s + d) + (t - e);
+                        }
                     }
                 }
                 self.forces.row_mut(row).fill(T::default());

@@ -32,17 +32,17 @@ pub(super) enum Diagonal {
 
 /// The vectors of one smoothing step.
 pub(super) struct Vectors<'a> {
-    pub b: &'a [f32],
     /// `K x`.
     pub t: &'a [f32],
     pub x: &'a mut [f32],
     pub d: &'a mut [f32],
 }
 
-/// `d = c1 d + c2 D^-1 (b - t)`, `x = x + d`. With `zero` x counts as zero and neither it nor t is read.
-pub(super) fn step(
+/// For the right side `b`, in single precision: `d = c1 d + c2 D^-1 (b - t)`, `x = x + d`. With `zero` x counts as zero and neither it nor t is read.
+pub(super) fn step<B: Copy + Into<f64> + Sync>(
     grid: &NodeGrid,
     diagonal: &Diagonal,
+    b: &[B],
     v: Vectors,
     zero: bool,
     (c1, c2): (f32, f32),
@@ -58,21 +58,21 @@ pub(super) fn step(
                     &mut x[c * count..(c + 1) * count],
                     &mut d[c * count..(c + 1) * count],
                 );
-                let b = &v.b[at..at + count];
+                let b = &b[at..at + count];
                 let inverse = match diagonal {
                     Diagonal::Node(all) => &all[first..first + count],
                     Diagonal::Component(all) => &all[at..at + count],
                 };
                 if zero {
                     for i in 0..count {
-                        let new = c2 * inverse[i] * b[i];
+                        let new = c2 * inverse[i] * (b[i].into() as f32);
                         d[i] = new;
                         x[i] = new;
                     }
                 } else {
                     let t = &v.t[at..at + count];
                     for i in 0..count {
-                        let new = c1 * d[i] + c2 * inverse[i] * (b[i] - t[i]);
+                        let new = c1 * d[i] + c2 * inverse[i] * (b[i].into() as f32 - t[i]);
                         d[i] = new;
                         x[i] += new;
                     }

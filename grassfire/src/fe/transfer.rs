@@ -4,8 +4,14 @@ use rayon::prelude::*;
 
 use super::grid::NodeGrid;
 
-/// `coarse = P' (b - t)`.
-pub(super) fn restrict(fine: &NodeGrid, b: &[f32], t: &[f32], grid: &NodeGrid, coarse: &mut [f32]) {
+/// `coarse = P' (b - t)`, in single precision.
+pub(super) fn restrict<B: Copy + Into<f64> + Sync>(
+    fine: &NodeGrid,
+    b: &[B],
+    t: &[f32],
+    grid: &NodeGrid,
+    coarse: &mut [f32],
+) {
     // The row of the finer grid, with one more node at both ends.
     let row = || vec![0f32; 2 * grid.n[0] + 3];
     let planes = grid.planes(3, coarse).enumerate();
@@ -26,7 +32,7 @@ pub(super) fn restrict(fine: &NodeGrid, b: &[f32], t: &[f32], grid: &NodeGrid, c
                             let to = &mut sum[run.x + 1..][..run.len];
                             let (b, t) = (&b[at..at + run.len], &t[at..at + run.len]);
                             for i in 0..run.len {
-                                to[i] += weight * (b[i] - t[i]);
+                                to[i] += weight * (b[i].into() as f32 - t[i]);
                             }
                         }
                     }
