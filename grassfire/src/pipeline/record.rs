@@ -97,7 +97,7 @@ fn peak_memory() -> f64 {
     let kilobytes = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     kilobytes
         .and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok())
-        .map_or(0.0, |kb| kb / 1024.0)
+        .map_or(0.0, |kilobytes| kilobytes * 1024.0 / 1e6)
 }
 
 /// One verdict as a line of text.

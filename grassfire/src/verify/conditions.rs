@@ -17,6 +17,8 @@ const PIECES: f64 = 3.0;
 /// Tolerances of selections are this share of those on voxels: the surface is known better than their corners, and pieces
 /// of the faces beside a selected one must not be taken with it.
 const SLACK: f64 = 0.1;
+/// A selection that meets no surface looks for nodes with the tolerances of voxels so many times those of the design.
+const WIDEST: f64 = 2.5;
 /// Trilinear weights below this are rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -238,7 +240,8 @@ impl Site<'_> {
         Ok(forces.map(|([z, y, x], f)| ([x, y, z], f.into())).collect())
     }
 
-    /// The nodes that a selection holds with the tolerances of voxels: for selections that meet no surface.
+    /// The nodes that a selection holds with the tolerances of the design's voxels, or larger ones: for selections that meet no
+    /// surface, such as an edge of the design space that the finished part has rounded. The tolerance is that of all grids.
     fn nodes_instead(
         &self,
         name: &str,
@@ -246,20 +249,23 @@ impl Site<'_> {
         nodes: &[Vec3],
         h: f64,
     ) -> Result<Vec<usize>, VerifyError> {
-        let places = Places::new(self.case, self.folder, nodes.to_vec(), h, self.monitor)?;
-        let found = places.select(name, self.monitor)?;
-        if found.is_empty() {
-            return Err(VerifyError::NotOnPart {
-                what,
-                name: name.to_owned(),
-            });
+        let designed = self.case.grid.h.max(h);
+        for slack in [designed, WIDEST * designed] {
+            let places = Places::new(self.case, self.folder, nodes.to_vec(), slack, self.monitor)?;
+            let found = places.select(name, self.monitor)?;
+            if !found.is_empty() {
+                let text = format!(
+                    "the {what} on {name:?} meets no surface: it acts on {} nodes, found with the tolerance of voxels of {slack:.2} mm",
+                    found.len()
+                );
+                self.monitor.warn(STAGE, text);
+                return Ok(found);
+            }
         }
-        let text = format!(
-            "the {what} on {name:?} meets no surface: it acts on {} nodes",
-            found.len()
-        );
-        self.monitor.warn(STAGE, text);
-        Ok(found)
+        Err(VerifyError::NotOnPart {
+            what,
+            name: name.to_owned(),
+        })
     }
 }
 
