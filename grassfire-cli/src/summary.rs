@@ -130,31 +130,40 @@ pub fn text(report: &Report, output: &Path) -> String {
     })
 }
 
+/// A number with so many decimals, and with more where three significant digits need them.
+fn number(value: f64, decimals: usize) -> String {
+    let needed = match value.abs().log10() {
+        size if size.is_finite() => (2.0 - size.floor()).clamp(0.0, 12.0) as usize,
+        _ => 0,
+    };
+    format!("{value:.*}", decimals.max(needed))
+}
+
 /// Verification.
 fn stiffness(report: &Report) -> Vec<(&'static str, String)> {
     let Some(block) = &report.verify else {
         return Vec::new();
     };
     let mut text = format!(
-        "{:.0} mm3, u_max {:.3} mm, U {:.3} J ({:.1} % between grids), c*v {:.1} kJ mm3",
+        "{:.0} mm3, u_max {} mm, U {} J ({:.1} % between grids), c*v {} kJ mm3",
         block.volume,
-        block.u_max,
-        block.strain_energy / 1e3,
+        number(block.u_max, 3),
+        number(block.strain_energy / 1e3, 3),
         100.0 * block.energy_error_estimate,
-        block.cv / 1e6
+        number(block.cv / 1e6, 1)
     );
     if let (Some(cv), Some(volume)) = (block.cv_equal_volume, block.equal_volume) {
-        let _ = write!(text, ", {:.1} at {volume:.0} mm3", cv / 1e6);
+        let _ = write!(text, ", {} at {volume:.0} mm3", number(cv / 1e6, 1));
     }
     let mut lines = vec![("stiffness", text)];
     if let Some(proposal) = &block.proposal {
         let mut text = format!(
-            "voxels of {:.0} mm3, u_max {:.3} mm, U {:.3} J ({:.1} % between grids), c*v {:.1} kJ mm3",
+            "voxels of {:.0} mm3, u_max {} mm, U {} J ({:.1} % between grids), c*v {} kJ mm3",
             proposal.volume,
-            proposal.u_max,
-            proposal.strain_energy / 1e3,
+            number(proposal.u_max, 3),
+            number(proposal.strain_energy / 1e3, 3),
             100.0 * proposal.energy_error_estimate,
-            proposal.cv / 1e6
+            number(proposal.cv / 1e6, 1)
         );
         if let Some(ratio) = proposal.cv_ratio {
             let _ = write!(text, "; at this volume the solid has {ratio:.3} times that");
@@ -163,11 +172,11 @@ fn stiffness(report: &Report) -> Vec<(&'static str, String)> {
     }
     if let Some(tets) = &block.tetrahedra {
         let mut text = format!(
-            "{} ten-node elements of {:.2} mm, u_max {:.3} mm, U {:.3} J ({:.1} % between meshes); the voxels have {:.4} times that",
+            "{} ten-node elements of {:.2} mm, u_max {} mm, U {} J ({:.1} % between meshes); the voxels have {:.4} times that",
             tets.elements,
             tets.size,
-            tets.u_max,
-            tets.strain_energy / 1e3,
+            number(tets.u_max, 3),
+            number(tets.strain_energy / 1e3, 3),
             100.0 * tets.energy_error_estimate,
             tets.voxel_ratio
         );
@@ -252,6 +261,13 @@ mod tests {
     use grassfire::report::{FileEntry, Limits, SolidBlock, VolumeBlock, judge};
 
     use super::*;
+
+    #[test]
+    fn small_numbers_do_not_become_zero() {
+        let found =
+            [(8.0786, 3), (0.004_12, 3), (0.0, 1), (-0.000_28, 1)].map(|(v, d)| number(v, d));
+        assert_eq!(found, ["8.079", "0.00412", "0.0", "-0.000280"]);
+    }
 
     #[test]
     fn reads_well() {
