@@ -121,3 +121,30 @@ impl WithSimd for StencilPlane<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_portable_path_gives_the_same_product() {
+        let grid = NodeGrid::new([21, 5, 4], &[true; 21 * 5 * 4]);
+        let mut stencil = Stencil::new(&grid);
+        let number = |i: usize| ((i * 37 + 11) % 101) as f32 / 101.0 - 0.5;
+        for (i, value) in stencil.values.iter_mut().enumerate() {
+            *value = number(i);
+        }
+        let u: Vec<f32> = (0..3 * grid.len()).map(number).collect();
+        let mut found = [Arch::new(), Arch::Scalar].map(|arch| {
+            stencil.arch = arch;
+            let mut y = grid.field();
+            stencil.apply(&grid, &u, &mut y);
+            y
+        });
+        let [wide, portable] = &mut found;
+        assert!(wide.iter().any(|v| v.abs() > 0.1));
+        for (a, b) in wide.iter().zip(portable) {
+            assert!((*a - *b).abs() < 1e-4, "{a} {b}");
+        }
+    }
+}
