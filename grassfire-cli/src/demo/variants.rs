@@ -1,8 +1,8 @@
 //! `grassfire demo wishbone --all`: the variants of Mayer, Denk and Wartzack 2023 (figure 5, table 1) side by side.
 //!
 //! I is optimized freely, II so that it leaves its mould; both are reconstructed as they are. III is I, edited for casting in
-//! the reconstruction: its undercuts are repaired (III-filled) and its sections grow towards the feeder. IV is II with growing
-//! sections.
+//! the reconstruction: its undercuts are repaired (III-filled), its sections grow towards the feeder, and gaps too narrow for sand go
+//! solid. IV is II with growing sections.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -27,6 +27,8 @@ const FEEDER: [f64; 3] = [112.0, 0.0, 15.0];
 const FOOT: f64 = 20.0;
 /// Cells of the freezing part, mm.
 const CELL: f64 = 2.0;
+/// Sand no thinner than the least wall of steel in sand, mm.
+const MIN_GAP: f64 = 6.0;
 
 /// One variant: its name, its project file, whether undercuts are repaired, the slope with which radii grow towards the
 /// feeder, and the variant whose optimization it takes.
@@ -64,7 +66,7 @@ const VARIANTS: [Variant; 5] = [
         name: "III",
         case: FREE,
         repair: Repair::Fill,
-        // Arms that were filled are thick: with more growth gaps close, and the body cuts itself.
+        // Arms that were filled are thick: what is left of the windows beside them closes when they grow.
         growth: Some(0.005),
         optimized_as: Some("I"),
     },
@@ -204,6 +206,11 @@ fn edited(mut case: Case, variant: &Variant) -> Case {
     options.solidify.feeders = vec![FEEDER];
     options.solidify.cell.get_or_insert(CELL);
     if let Some(growth) = variant.growth {
+        options.mould.min_gap = if variant.repair == Repair::Off {
+            0.0
+        } else {
+            MIN_GAP
+        };
         options.feed.feeders = vec![FEEDER];
         options.feed.feeder_radius = FOOT;
         options.feed.growth = growth;

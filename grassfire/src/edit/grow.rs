@@ -31,17 +31,41 @@ pub fn grow(
     if most <= 0.0 && least >= 0.0 {
         return field.clone();
     }
+    let places = Bvh::new(cells);
+    let by = |p: &Vec3| {
+        let nearest = places.nearest(p, f64::INFINITY)?;
+        let corners = cells.triangles[nearest.triangle as usize];
+        Some(interpolate(cells, corners, &nearest.point, growth))
+    };
+    moved(field, surface, [least, most], 2.0 * field.spacing, by)
+}
+
+/// The signed distance, mm, moved outward by `by` everywhere: of `field` only the signs count, distances are to its zero `surface`.
+pub(crate) fn offset(field: &VoxelGrid<f32>, surface: &TriMesh, by: f64) -> VoxelGrid<f32> {
+    moved(field, surface, [by.min(0.0), by.max(0.0)], 0.0, |_| {
+        Some(by)
+    })
+}
+
+/// The field with its surface moved outward by what `growth` says of each place, from `least` to `most`; the field is exact below
+/// `known`.
+fn moved(
+    field: &VoxelGrid<f32>,
+    surface: &TriMesh,
+    [least, most]: [f64; 2],
+    known: f64,
+    growth: impl Fn(&Vec3) -> Option<f64> + Sync,
+) -> VoxelGrid<f32> {
     let h = field.spacing;
     let by = [(most / h).ceil() as usize + 1; 3];
     let out = padded(field, by, by);
     let reach = most.max(-least) + MARGIN * h;
     let distances = Bvh::new(surface);
-    let places = Bvh::new(cells);
     let value = |(index, &f): (usize, &f32)| {
         let [i, j, k] = out.ijk(index);
         let p = out.centre(i, j, k);
         let f = f64::from(f);
-        let exact = if f.abs() < 2.0 * h {
+        let exact = if f.abs() < known {
             f
         } else {
             f.signum() * distances.nearest(&p, reach).map_or(reach, |n| n.distance)
@@ -49,11 +73,7 @@ pub fn grow(
         if exact.abs() >= reach {
             return exact as f32;
         }
-        let Some(nearest) = places.nearest(&p, f64::INFINITY) else {
-            return f as f32;
-        };
-        let corners = cells.triangles[nearest.triangle as usize];
-        (exact + interpolate(cells, corners, &nearest.point, growth)) as f32
+        (exact + growth(&p).unwrap_or(0.0)) as f32
     };
     let values = out.values.par_iter().enumerate().map(value).collect();
     VoxelGrid { values, ..out }

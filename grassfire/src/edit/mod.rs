@@ -24,6 +24,7 @@ mod weld;
 pub use bridge::Between;
 pub use draft::EditedSkeleton;
 pub use error::{EditListError, Refusal};
+pub(crate) use grow::offset;
 pub use grow::{cells_of, grow};
 pub use list::{Counts, Edit, Edited, check_edits, edit};
 pub use material::material;

@@ -136,25 +136,12 @@ pub(super) fn drawn_out(
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Option<Remeshed>, PipelineError> {
-    let asked = &options.mould;
-    let Some(draw) = asked.draw.filter(|_| asked.repairs()) else {
+    if options.mould.draw.is_none() || !options.mould.repairs() {
         return Ok(None);
-    };
-    let cell = from.field.spacing;
+    }
     let (repaired, solid) = record.stage("mould", || {
-        mould::check(asked)?;
-        let (mesh, draw) = (from.solid.mesh(), Vec3::from(draw).normalize());
-        let (_, height) = parting(&dexels(mesh, &draw, asked.lines));
-        let mut asked = asked.repair_options(height, cell);
-        asked.bores.clone_from(&bodies.bosses.free);
-        let repaired = mould::repair(mesh, &draw, &asked, monitor)?;
-        let mut on_grid = RemeshOptions {
-            voxel: Some(cell),
-            ..options.remesh.clone()
-        };
-        on_grid.keep_open.extend(&bodies.bosses.free);
-        let solid = remesh(&repaired.mesh, &on_grid, monitor)?;
-        Ok::<_, StageError>((repaired, solid))
+        mould::check(&options.mould)?;
+        repaired(from, bodies, options, &options.mould, monitor)
     })?;
     record.report.mould = Some(MouldBlock {
         repaired_volume: Some(repaired.volume[1]),
@@ -163,6 +150,51 @@ pub(super) fn drawn_out(
         ..MouldBlock::default()
     });
     Ok(Some(solid))
+}
+
+/// What has grown after a repair, repaired once more where gaps must not be narrow (`mould.min_gap`): what growth left of a gap may
+/// be too narrow for sand, and two walls that wave towards each other have no skeleton worth having. Sides that were removed stay
+/// away.
+///
+/// # Errors
+/// Those of the repair and of the remesh.
+pub(super) fn drawn_out_again(
+    from: Remeshed,
+    bodies: &Bodies,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Remeshed, StageError> {
+    let asked = MouldOptions {
+        removals: Vec::new(),
+        ..options.mould.clone()
+    };
+    if asked.draw.is_none() || asked.min_gap <= 0.0 {
+        return Ok(from);
+    }
+    Ok(repaired(&from, bodies, options, &asked, monitor)?.1)
+}
+
+/// A solid repaired on its own voxels as `asked`, and remeshed on them.
+fn repaired(
+    from: &Remeshed,
+    bodies: &Bodies,
+    options: &ReconstructOptions,
+    asked: &MouldOptions,
+    monitor: &Monitor,
+) -> Result<(mould::Repaired, Remeshed), StageError> {
+    let (mesh, cell) = (from.solid.mesh(), from.field.spacing);
+    let draw = asked.draw.map_or_else(Vec3::z, Vec3::from).normalize();
+    let (_, height) = parting(&dexels(mesh, &draw, asked.lines));
+    let mut asked = asked.repair_options(height, cell);
+    asked.bores.clone_from(&bodies.bosses.free);
+    let repaired = mould::repair(mesh, &draw, &asked, monitor)?;
+    let mut on_grid = RemeshOptions {
+        voxel: Some(cell),
+        ..options.remesh.clone()
+    };
+    on_grid.keep_open.extend(&bodies.bosses.free);
+    let solid = remesh(&repaired.mesh, &on_grid, monitor)?;
+    Ok((repaired, solid))
 }
 
 /// Looks at the mould of a finished part when a draw direction is given; what was repaired before stays in the report.
@@ -178,6 +210,7 @@ pub(super) fn mould_of(
     let options = MouldOptions {
         repair: Repair::Off,
         repair_draft: 0.0,
+        min_gap: 0.0,
         removals: Vec::new(),
         ..options.clone()
     };

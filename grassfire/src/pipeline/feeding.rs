@@ -2,6 +2,7 @@
 
 use super::ReconstructOptions;
 use super::bodies::Bodies;
+use super::casting::drawn_out_again;
 use super::error::{PipelineError, StageError};
 use super::follow;
 use super::record::Record;
@@ -90,7 +91,8 @@ pub(super) struct Grown {
 ///
 /// 1. The least radii on the proposal's skeleton or medial axis ([`feed_graph`]).
 /// 2. The proposal's field moves outward by what they grew ([`grow`]); bores that stay free stay so.
-/// 3. The grown field is remeshed: where gaps close, the topology changes here and is known to all later stages.
+/// 3. The grown field is remeshed: where gaps close, the topology changes here and is known to all later stages. Gaps below
+///    `mould.min_gap` close, too.
 ///
 /// It is for the case that the body itself cannot grow ([`fed`]); what its skeleton asks for then is done on its body.
 /// Growing the field again and again was tried: junctions swell round after round until no body of the skeleton is sound.
@@ -160,6 +162,7 @@ fn one_round(
         let mut field = grow(&from.field, from.solid.mesh(), &cells, &growth);
         keep_free(&mut field, &bodies.bosses.free);
         let grown = solid_of(field, bodies, options, monitor)?;
+        let grown = drawn_out_again(grown, bodies, options, monitor)?;
         Ok::<_, StageError>((fed, Some(grown)))
     })
 }

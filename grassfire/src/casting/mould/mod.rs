@@ -6,6 +6,7 @@ mod cores;
 pub mod dexels;
 pub mod directions;
 pub mod draft;
+mod gaps;
 pub mod repair;
 mod rooms;
 pub mod rules;
@@ -69,6 +70,9 @@ pub struct MouldOptions {
     /// For the repair `best`: most variants that are made. All combinations are where that is enough, else the undercuts are
     /// settled one after another, the largest first.
     pub tries: usize,
+    /// Gaps narrower than this go solid in a repair, and once more when sections have grown towards feeders, mm: sand between walls
+    /// that are too near each other burns on or breaks off. 0 keeps all.
+    pub min_gap: f64,
     /// Voxel of the repair, mm; without it the pitch of the lines.
     pub cell: Option<f64>,
     /// Limits of the foundry.
@@ -91,6 +95,7 @@ impl Default for MouldOptions {
             removals: Vec::new(),
             core_price: None,
             tries: 12,
+            min_gap: 0.0,
             cell: None,
             rules: Rules::default(),
         }
@@ -100,7 +105,10 @@ impl Default for MouldOptions {
 impl MouldOptions {
     /// A repair is asked for.
     pub fn repairs(&self) -> bool {
-        self.repair != Repair::Off || self.repair_draft > 0.0 || !self.removals.is_empty()
+        self.repair != Repair::Off
+            || self.repair_draft > 0.0
+            || self.min_gap > 0.0
+            || !self.removals.is_empty()
     }
 
     /// The repair that is asked for, with the parting plane at a height along the draw direction and voxels of `cell`, mm.
@@ -114,6 +122,7 @@ impl MouldOptions {
             cores: self.cores.iter().map(|p| Vec3::from(*p)).collect(),
             bores: Vec::new(),
             removals: self.removals.iter().map(|p| Vec3::from(*p)).collect(),
+            min_gap: self.min_gap,
         }
     }
 }
@@ -395,6 +404,7 @@ pub fn check(options: &MouldOptions) -> Result<(), MouldError> {
     let price = options.core_price.unwrap_or(0.0);
     range("core_price", price, 0.0, 1e12, "0 or more, mm3")?;
     range("tries", options.tries as f64, 1.0, 1000.0, "1 to 1000")?;
+    range("min_gap", options.min_gap, 0.0, 1e6, "0 or more, mm")?;
     range("repair_draft", options.repair_draft, 0.0, 30.0, "0 to 30")?;
     range(
         "cell",

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cores::cored;
 use super::dexels::axes;
+use super::gaps::{close_gaps, density};
 use super::rooms::remove_lesser;
 use super::{MouldError, STAGE};
 use crate::Vec3;
@@ -66,6 +67,8 @@ pub struct RepairOptions {
     pub bores: Vec<Capsule>,
     /// A place in each undercut whose lesser side is taken away, mm.
     pub removals: Vec<Vec3>,
+    /// Gaps narrower than this go solid, mm; 0 keeps all.
+    pub min_gap: f64,
 }
 
 /// A part without undercuts.
@@ -89,9 +92,10 @@ pub struct Repaired {
 /// 4. [`Repair::Keep`]: on every line the interval with the largest sum of +1 a solid and `-cost` an empty voxel (Kadane's
 ///    maximum subarray, exact); what lies outside goes, what lies inside is filled as above. Loose
 ///    pieces go as before.
-/// 5. Draft: from both ends towards `parting`, every value becomes at least the one before plus the tangent of the draft
+/// 5. With `min_gap` narrower gaps go solid, but not what cores make; what that hides is filled.
+/// 6. Draft: from both ends towards `parting`, every value becomes at least the one before plus the tangent of the draft
 ///    times the step.
-/// 6. The surface is extracted and turned back.
+/// 7. The surface is extracted and turned back.
 ///
 /// # Errors
 /// [`MouldError::Grid`] when the part cannot be put on the grid, [`MouldError::Place`] for a place without an undercut; cancelled.
@@ -122,6 +126,13 @@ pub fn repair(
             format!("the repair cut off {pieces} pieces of {lost:.0} mm3, which are left out"),
         );
     }
+    if options.min_gap > 0.0 {
+        close_gaps(&mut field, options.min_gap, &grid(options.cell), monitor)
+            .map_err(|source| refused(source, options.cell))?;
+        if options.kind != Repair::Off {
+            fill(&mut field);
+        }
+    }
     if options.draft > 0.0 {
         add_draft(
             &mut field,
@@ -133,13 +144,7 @@ pub fn repair(
     for (v, value) in open {
         field.values[v] = value;
     }
-    // As a density: 1/2 at the surface, one voxel up and down.
-    let h = field.spacing as f32;
-    let density = VoxelGrid {
-        values: field.values.iter().map(|f| 0.5 + f / h).collect(),
-        ..field
-    };
-    let out = remesh_density(&density, 0.5, &grid(options.cell), monitor)
+    let out = remesh_density(&density(&field), 0.5, &grid(options.cell), monitor)
         .map_err(|source| refused(source, options.cell))?;
     Ok(Repaired {
         mesh: turn(out.solid.mesh(), |p| back(p, &frame)),

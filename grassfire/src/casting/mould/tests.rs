@@ -128,6 +128,32 @@ fn filling_leaves_one_interval_a_line_and_the_least_volume() {
 }
 
 #[test]
+fn gaps_too_narrow_for_sand_go_solid() {
+    // Three plates, 3 and 8 mm apart, on voxels of 0.5 mm.
+    let mesh = boxes(&[
+        [0.0, 0.0, 0.0, 4.0, 40.0, 20.0],
+        [7.0, 0.0, 0.0, 11.0, 40.0, 20.0],
+        [19.0, 0.0, 0.0, 23.0, 40.0, 20.0],
+    ]);
+    let volume = |min_gap: f64| {
+        let options = MouldOptions {
+            min_gap,
+            cell: Some(0.5),
+            ..along([0.0, 0.0, 1.0])
+        };
+        let repaired = look(&mesh, &options).repaired.expect("asked for");
+        repaired.volume[1] / repaired.volume[0]
+    };
+    let plates = |wide: f64| wide / 12.0;
+    // A groove, a millimetre deep at most, is left along the rim of a closed gap.
+    for (min_gap, wanted) in [(2.0, 12.0), (5.0, 15.0), (16.0, 23.0)] {
+        let found = volume(min_gap);
+        let off = found / plates(wanted) - 1.0;
+        assert!(off.abs() < 0.05, "{min_gap}: {found:.3} times");
+    }
+}
+
+#[test]
 fn keeping_drops_the_lesser_flange_when_filling_is_dear() {
     // The lower flange is twice as thick as the upper one.
     let mesh = boxes(&[
