@@ -68,12 +68,8 @@ impl Annealing<'_> {
             .filter(|&v| !m.around[v as usize].is_empty())
             .map(|v| star(m, v).map_or(100.0, |s| s.cost(self.effort.inner)))
             .sum();
-        let quads: f64 = m.alive().map(|(_, q)| self.shape_cost(m, &q)).sum();
+        let quads: f64 = m.alive().map(|(_, q)| shape_cost(m, &q, self.sizing)).sum();
         vertices + quads
-    }
-
-    fn shape_cost(&self, m: &QuadMesh, q: &[u32; 4]) -> f64 {
-        shape_cost(m, q, self.sizing, self.effort.corner)
     }
 
     /// Cost of the vertices.
@@ -92,7 +88,7 @@ impl Annealing<'_> {
         quads.sort_unstable();
         quads.dedup();
         for i in quads {
-            sum += self.shape_cost(m, &m.quad(i)?);
+            sum += shape_cost(m, &m.quad(i)?, self.sizing);
         }
         Some(sum)
     }

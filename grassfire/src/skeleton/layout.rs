@@ -1,4 +1,4 @@
-//! How the quads of a skeleton are laid out: what a search may cost, and what it pays for.
+//! How the quads of a skeleton are laid out: how long is searched, and for what.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,20 +9,18 @@ use serde::{Deserialize, Serialize};
 pub enum Layout {
     /// The regular one where its body follows the proposal closely, else the plain one. Where no body is made of the skeleton
     /// (edits, feeding) and with feeders the plain one.
-    #[default]
     Auto,
     /// Quads of the wanted size with few irregular vertices of the body.
+    #[default]
     Plain,
-    /// Searched four times as long, with dearer corners and irregular vertices inside sheets, and then every row of quads split:
+    /// Searched four times as long, with dearer irregular vertices inside sheets, and then every row of quads split:
     /// twice as many quads, nearly all vertices inside sheets with four of them.
     Regular,
 }
 
-/// What the quads and vertices of a layout cost, and how long is searched.
+/// What irregular vertices of a layout cost, and how long is searched.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
-    /// Cost of corners at 45 degrees, against irregular body valences.
-    pub corner: f64,
     /// Cost of an irregular vertex inside a sheet, beside that of its body vertices.
     pub inner: f64,
     /// Proposals a quad and search.
@@ -35,14 +33,12 @@ impl Layout {
     pub(crate) fn effort(self) -> Effort {
         match self {
             Self::Auto | Self::Plain => Effort {
-                corner: 0.8,
                 inner: 0.0,
                 proposals: 300,
                 most_proposals: 200_000,
             },
             Self::Regular => Effort {
-                corner: 1.2,
-                inner: 5.0,
+                inner: 3.0,
                 proposals: 1200,
                 most_proposals: 800_000,
             },

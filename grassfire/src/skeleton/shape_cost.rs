@@ -6,6 +6,8 @@ use super::quad_mesh::{QuadMesh, Undo};
 use super::reference::Reference;
 use crate::Vec3;
 
+/// Cost of corners at 45 degrees, against irregular body valences.
+const CORNER: f64 = 0.8;
 /// Cost of a side e times too long or too short.
 const SIZE: f64 = 0.5;
 /// Sides longer than this many times the wanted length cost much.
@@ -14,8 +16,8 @@ const TOO_LONG: f64 = 20.0;
 /// Cost of a corner that is folded over.
 const FOLD: f64 = 6.0;
 
-/// Corners off the right angle (`corner` each at 45 degrees), folds, and sides off the wanted length.
-pub(crate) fn shape_cost(m: &QuadMesh, q: &[u32; 4], sizing: &Sizing, corner: f64) -> f64 {
+/// Corners off the right angle, folds, and sides off the wanted length.
+pub(crate) fn shape_cost(m: &QuadMesh, q: &[u32; 4], sizing: &Sizing) -> f64 {
     let p = q.map(|v| m.points[v as usize]);
     let side: [Vec3; 4] = std::array::from_fn(|k| p[(k + 1) % 4] - p[k]);
     let squared = side.map(|s| s.norm_squared().max(1e-30));
@@ -26,7 +28,7 @@ pub(crate) fn shape_cost(m: &QuadMesh, q: &[u32; 4], sizing: &Sizing, corner: f6
         let before = (k + 3) % 4;
         let dot = -side[k].dot(&side[before]);
         let cos2 = dot * dot / (squared[k] * squared[before]);
-        sum += 2.0 * corner * cos2;
+        sum += 2.0 * CORNER * cos2;
         // From 60 degrees off the price rises fast; a reflex corner is a fold.
         if cos2 > 0.75 {
             sum += 4.0 * FOLD * (cos2 - 0.75);
