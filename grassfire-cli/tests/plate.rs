@@ -38,6 +38,22 @@ fn plate_becomes_a_good_part() {
     }
 }
 
+/// The report says which layout was taken, and why not the regular one when that was tried.
+#[test]
+fn the_regular_layout_of_quads_is_tried_on_request() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let layout = |args: &[&str]| {
+        let args = [&["--recognise", "off"], args].concat();
+        run_plate(folder.path(), &args).report()["skeleton"].take()
+    };
+    let plain = layout(&[]);
+    assert_eq!(plain["layout"], "plain");
+    assert!(plain["regular_refused"].is_null());
+    let auto = layout(&["--set", "skeleton.layout=auto"]);
+    let refused = auto["regular_refused"].is_string();
+    assert_eq!(auto["layout"], if refused { "plain" } else { "regular" });
+}
+
 /// One corner gets thicker, the far one stays; an edit of a place without skeleton is refused before anything is written.
 #[test]
 fn edits_thicken_their_place_only() {

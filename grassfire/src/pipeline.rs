@@ -59,7 +59,7 @@ use crate::non_design::FlatOptions;
 use crate::radii::RadiiOptions;
 use crate::remesh::{CutOutOptions, RemeshOptions, Remeshed, WrapOptions};
 use crate::report::{Picture, Report, ReportOptions};
-use crate::skeleton::SkeletonOptions;
+use crate::skeleton::{Layout, SkeletonOptions};
 use crate::spline::{BrepOptions, PatchOptions, TessellateOptions};
 use crate::thicken::ThickenOptions;
 
@@ -259,6 +259,14 @@ fn prepared(
     })
 }
 
+/// With feeders the plain layout: a body that grows does it in many fits, of few quads the better.
+fn first_layout(options: &ReconstructOptions) -> Layout {
+    match options.skeleton.layout {
+        Layout::Auto if options.feed.active() => Layout::Plain,
+        layout => layout,
+    }
+}
+
 /// All stages of [`reconstruct`] but the report.
 fn rebuild(
     record: &mut Record,
@@ -320,6 +328,8 @@ fn rebuild(
         monitor,
         must_grow: false,
         grown: None,
+        layout: first_layout(options),
+        regular_refused: None,
     };
     let made = match &fed {
         Some(grown) => site.build_grown(grown)?,

@@ -14,7 +14,7 @@ use crate::medial::{self, MedialAxis};
 use crate::mesh::Distance;
 use crate::monitor::Monitor;
 use crate::remesh::{DesignPart, Remeshed, cut_out};
-use crate::skeleton::Skeleton;
+use crate::skeleton::{Layout, Skeleton};
 use crate::topology::Betti;
 
 /// Times that a part is made without the bulges of flat faces that could not be cut.
@@ -34,6 +34,10 @@ pub(super) struct Site<'a> {
     pub(super) must_grow: bool,
     /// The proposal with the growth of the body, which the part is measured against then.
     pub(super) grown: Option<Remeshed>,
+    /// Layout of the skeleton's quads; [`Layout::Auto`] until a part of the regular one was given up.
+    pub(super) layout: Layout,
+    /// Why it was, if it was.
+    pub(super) regular_refused: Option<String>,
 }
 
 /// The part with the stages before it.
@@ -44,6 +48,9 @@ pub(super) struct Made {
     /// From the part to the proposal and back.
     pub(super) distance: Distance,
 }
+
+/// A part, or what speaks against it.
+type Judged = Result<Made, String>;
 
 impl<'a> Site<'a> {
     /// Makes the part with sections that grow towards the feeders.
@@ -80,7 +87,8 @@ impl<'a> Site<'a> {
     /// 2. When that gives no sound body or no valid union with the proposal's topology, or there are no bodies, the
     ///    proposal is made as a whole; the body ends inside the walls of given bodies then. Recognised ones are left out
     ///    when no union with them is valid.
-    /// 3. Where flat faces could not be cut plane, all is made once more without their bulge.
+    /// 3. Either is tried with the regular layout of quads first, once, and with the plain one when that part is refused.
+    /// 4. Where flat faces could not be cut plane, all is made once more without their bulge.
     pub(super) fn build(&mut self) -> Result<Made, PipelineError> {
         for _ in 0..FLAT_ROUNDS {
             let made = self.build_once()?;
@@ -107,7 +115,8 @@ impl<'a> Site<'a> {
             }
             Err(error) => self.give_up(&format!("{} failed: {}", error.stage, error.source)),
         }
-        self.as_a_whole()
+        let problem = |tried: &(Made, Option<String>)| tried.1.clone();
+        Ok(self.by_layouts(Self::as_a_whole, problem)?.0)
     }
 
     fn give_up(&self, reason: &str) {
@@ -154,10 +163,47 @@ impl<'a> Site<'a> {
             united: Some(wanted),
             lost,
         };
-        let (axis, mut shape) = self.shape(&base)?;
+        let problem = |judged: &Judged| judged.as_ref().err().cloned();
+        match self.by_layouts(|site| site.united(&base, &wanted), problem)? {
+            Ok(made) => Ok(Some(made)),
+            Err(problem) => {
+                self.give_up(&problem);
+                Ok(None)
+            }
+        }
+    }
+
+    /// What `make` gives with the regular layout of quads, or with the plain one when that fails or has a problem.
+    fn by_layouts<T>(
+        &mut self,
+        make: impl Fn(&mut Self) -> Result<T, PipelineError>,
+        problem: impl Fn(&T) -> Option<String>,
+    ) -> Result<T, PipelineError> {
+        let told = self.monitor.warnings().len();
+        let made = make(self);
+        if self.layout != Layout::Auto {
+            return made;
+        }
+        let refused = match &made {
+            Ok(made) => problem(made),
+            Err(error) if error.is_cancelled() => None,
+            Err(error) => Some(format!("{} failed: {}", error.stage, error.source)),
+        };
+        if refused.is_none() {
+            return made;
+        }
+        self.monitor.keep_warnings(told);
+        self.layout = Layout::Plain;
+        self.regular_refused = refused;
+        make(self)
+    }
+
+    /// The body of a design part united with the bodies.
+    fn united(&mut self, base: &Base, wanted: &Betti) -> Result<Judged, PipelineError> {
+        let (remeshed, options, monitor) = (self.remeshed, self.options, self.monitor);
+        let (axis, mut shape) = self.shape(base)?;
         if !shape.sound() {
-            self.give_up("its body cuts itself or folds over");
-            return Ok(None);
+            return Ok(Err("its body cuts itself or folds over".to_owned()));
         }
         let (surface, joined) = self.joined_below(&mut shape)?;
         let voxel = remeshed.field.spacing;
@@ -169,24 +215,22 @@ impl<'a> Site<'a> {
         if self.bodies.refuses_flats(&part.flats) {
             // It bulges there: no use in judging it.
             let distance = self.distance(&part)?;
-            return Ok(Some(Made {
+            return Ok(Ok(Made {
                 axis,
                 shape,
                 part,
                 distance,
             }));
         }
-        if let Some(problem) = part.problem(&wanted) {
-            self.give_up(&problem);
-            return Ok(None);
+        if let Some(problem) = part.problem(wanted) {
+            return Ok(Err(problem));
         }
         let distance = self.distance(&part)?;
         if let Some(problem) = self.too_far(&part, &distance) {
-            self.give_up(&problem);
-            return Ok(None);
+            return Ok(Err(problem));
         }
         self.report(&axis, &shape, base.united);
-        Ok(Some(Made {
+        Ok(Ok(Made {
             axis,
             shape,
             part,
@@ -222,7 +266,8 @@ impl<'a> Site<'a> {
         })
     }
 
-    fn as_a_whole(&mut self) -> Result<Made, PipelineError> {
+    /// The part of the whole proposal, and what speaks against it if it is of the regular layout: else nothing better is left.
+    fn as_a_whole(&mut self) -> Result<(Made, Option<String>), PipelineError> {
         let (remeshed, options, monitor) = (self.remeshed, self.options, self.monitor);
         let voxel = remeshed.field.spacing;
         let delivery = self.delivery;
@@ -253,9 +298,11 @@ impl<'a> Site<'a> {
             self.bodies.drop_recognised(monitor);
         }
         let (surface, joined, _) = self.joined(&mut shape, surface)?;
+        let choosy = self.layout == Layout::Auto;
         let bodies = &mut *self.bodies;
         let part = self.record.stage("cad", || {
-            union::part(
+            let make = if choosy { union::judged } else { union::part };
+            make(
                 &surface,
                 joined,
                 bodies,
@@ -266,13 +313,17 @@ impl<'a> Site<'a> {
             )
         })?;
         let distance = self.distance(&part)?;
+        let problem = (choosy && !self.bodies.refuses_flats(&part.flats))
+            .then(|| part.problem(&axis.solid))
+            .and_then(|problem| problem.or_else(|| self.too_far(&part, &distance)));
         self.report(&axis, &shape, base.united);
-        Ok(Made {
+        let made = Made {
             axis,
             shape,
             part,
             distance,
-        })
+        };
+        Ok((made, problem))
     }
 
     /// Medial axis, skeleton and fitted body, each written as it is made.
@@ -282,13 +333,33 @@ impl<'a> Site<'a> {
             medial::medial_axis(&base.remeshed.field, &options.medial, monitor)
         })?;
         self.record.stage("write", || delivery.medial(&axis.mesh))?;
-        let shape = shape::shape(self.record, &axis, base, self.drawn, options, monitor)?;
+        let shape = self.laid_out(&axis, base)?;
         let shape = self.fed(shape, base)?;
         let voxel = base.remeshed.field.spacing;
         let shape = fewest(self.record, shape, voxel, options, monitor)?;
         self.record
             .stage("write", || delivery.skeleton(&shape.skeleton.skeleton))?;
         Ok((axis, shape))
+    }
+
+    /// The fitted body; when it is not of the regular layout, that is not tried again.
+    fn laid_out(&mut self, axis: &MedialAxis, base: &Base) -> Result<Shape, PipelineError> {
+        let (layout, drawn, options) = (self.layout, self.drawn, self.options);
+        let shape = shape::shape(
+            self.record,
+            axis,
+            base,
+            drawn,
+            layout,
+            options,
+            self.monitor,
+        );
+        let regular = shape.as_ref().is_ok_and(|s| s.layout == Layout::Regular);
+        if layout == Layout::Auto && !regular {
+            self.layout = Layout::Plain;
+            self.regular_refused = shape.as_ref().ok().and_then(|s| s.regular_refused.clone());
+        }
+        shape
     }
 
     /// The shape with sections that grow towards the feeders, as far as its body can follow.
@@ -338,7 +409,12 @@ impl<'a> Site<'a> {
     fn report(&mut self, axis: &MedialAxis, shape: &Shape, united: Option<Betti>) {
         let report = &mut self.record.report;
         report.topology = Some(measure::topology_block(axis, shape, united));
-        report.skeleton = Some(measure::skeleton_block(axis, shape));
+        let refused = self.regular_refused.clone();
+        let layout = match self.drawn {
+            Some(_) => "drawn",
+            None => shape.layout.name(),
+        };
+        report.skeleton = Some(measure::skeleton_block(axis, shape, layout, refused));
         report.body = Some(measure::body_block(shape));
     }
 }

@@ -103,6 +103,10 @@ pub enum StageError {
         rules: usize,
         why: &'static str,
     },
+    #[error(
+        "its body of {quads} quads is too large to be fitted for a comparison ({most} quads at most)"
+    )]
+    LargeBody { quads: usize, most: usize },
     #[error("retry.quad_sizes is empty: no quad size to try")]
     NoQuadSize,
     #[error("the format {format} cannot be written: this build has no OpenCASCADE")]
@@ -192,6 +196,9 @@ impl PipelineError {
             StageError::Growth { .. } => Some("less feed.growth asks for less metal".into()),
             StageError::NoFeeders => Some("give one with --feeder x,y,z".into()),
             StageError::Open { .. } => Some("a smaller files.chord may help".into()),
+            StageError::LargeBody { .. } => {
+                Some("skeleton.layout=regular takes the layout without comparison".into())
+            }
             StageError::NoQuadSize => {
                 Some("give at least one factor, such as retry.quad_sizes=[1.0]".into())
             }

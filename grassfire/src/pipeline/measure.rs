@@ -51,10 +51,17 @@ pub(super) fn topology_block(
     }
 }
 
-pub(super) fn skeleton_block(axis: &MedialAxis, shape: &Shape) -> SkeletonBlock {
+pub(super) fn skeleton_block(
+    axis: &MedialAxis,
+    shape: &Shape,
+    layout: &str,
+    regular_refused: Option<String>,
+) -> SkeletonBlock {
     let stats = &shape.skeleton.stats;
     let corners = &stats.corner_deviation;
     SkeletonBlock {
+        layout: layout.to_owned(),
+        regular_refused,
         quads: stats.quads,
         beams: stats.beams,
         sheets: stats.sheets,

@@ -43,7 +43,10 @@ fn worth_trying(size: f64, best: Best, design_part: bool) -> bool {
 pub(super) const MANY: usize = 3;
 
 /// Quads below this multiple of the usual size are much finer.
-const FINE: f64 = 0.75;
+pub(super) const FINE: f64 = 0.75;
+
+/// A regular layout whose body is within this of the proposal everywhere is taken without making another one, voxels.
+const NEAR: f64 = 1.5;
 
 /// How good a fitted body is.
 pub(super) struct Score {
@@ -102,6 +105,29 @@ impl Score {
         self.sound() && self.excess <= USABLE
     }
 
+    /// Good, and close to the proposal: within `close` on the whole, and nowhere far.
+    pub(super) fn close(&self, close: f64) -> bool {
+        self.good() && self.rough <= close && self.farthest <= NEAR
+    }
+
+    /// Why a body of a regular layout is not taken instead of another one: it is not good, or more than `close` or somewhere
+    /// far from the proposal, and farther than the other.
+    pub(super) fn refused_for(&self, other: &Self, close: f64) -> Option<String> {
+        if !self.good() {
+            return Some(self.to_string());
+        }
+        let farther = |mine: f64, other: f64, limit: f64| mine > other.max(limit);
+        let refused = other.good()
+            && (farther(self.rough, other.rough, close)
+                || farther(self.farthest, other.farthest, NEAR));
+        refused.then(|| {
+            format!(
+                "the body is {:.2} voxels (rms) and at most {:.1} voxels from the proposal, that of the plain one {:.2} and {:.1}",
+                self.rough, self.farthest, other.rough, other.farthest
+            )
+        })
+    }
+
     /// So far off that other quad sizes do not help: the part is not made of sheets and members.
     pub(super) fn hopeless(&self) -> bool {
         self.crossings > 0 && self.excess > HOPELESS
@@ -153,6 +179,31 @@ mod tests {
         let (torn, close) = (score(4.0), score(1.0));
         assert!(close.good() && !torn.good() && torn.sound());
         assert!(close.worse() < torn.worse());
+    }
+
+    #[test]
+    fn a_regular_layout_never_makes_a_part_farther_from_the_proposal() {
+        let score = |rough: f64, farthest: f64, crossings: usize| Score {
+            crossings,
+            folds: 0,
+            excess: 0.5,
+            rough,
+            farthest,
+        };
+        let refused = |regular: &Score, plain: &Score| regular.refused_for(plain, 0.22).is_some();
+        // Close: taken without another try, and whatever that gave.
+        let close = score(0.15, 1.4, 0);
+        assert!(close.close(0.22) && !refused(&close, &score(0.1, 0.8, 0)));
+        // Far somewhere: only if the plain one is, too.
+        let far = score(0.15, 2.2, 0);
+        assert!(!far.close(0.22) && refused(&far, &score(0.15, 1.7, 0)));
+        assert!(!refused(&far, &score(0.15, 2.3, 0)) && !refused(&far, &score(0.15, 1.0, 1)));
+        let rough = score(0.3, 1.0, 0);
+        assert!(!rough.close(0.22) && refused(&rough, &score(0.25, 1.0, 0)));
+        assert!(!refused(&rough, &score(0.35, 1.0, 0)));
+        // Unsound or torn: never.
+        assert!(refused(&score(0.1, 0.5, 1), &score(0.9, 9.0, 5)));
+        assert!(refused(&score(0.1, 3.5, 0), &score(0.1, 4.0, 0)));
     }
 
     #[test]

@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 use super::ReconstructOptions;
 use super::error::{PipelineError, StageError};
 use super::record::Record;
-use super::score::{Best, MANY, Score, next_size};
+use super::score::{Best, FINE, MANY, Score, next_size};
 use crate::fit::{FitOptions, Fitted, fit, volume};
 use crate::medial::MedialAxis;
 use crate::monitor::Monitor;
 use crate::radii;
 use crate::remesh::{Remeshed, WrapOptions, wrap};
-use crate::skeleton::{self, QuadSkeleton, Skeleton, quad_skeleton};
+use crate::skeleton::{self, Layout, QuadSkeleton, Skeleton, quad_skeleton};
 use crate::spline::{
     self, Brep, ControlMesh, CurvatureJump, G1Report, SplineError, Tessellation, build_brep,
     patches, tessellate,
@@ -20,6 +20,9 @@ use crate::spline::{
 use crate::thicken::{self, ThickenedBody, thicken};
 use crate::topology::Betti;
 use crate::voxel::VoxelGrid;
+
+/// Bodies of a regular layout with more quads get but one start of the fit, if any, and take longest: noise and bulk mostly.
+const MOST_QUADS: usize = 2000;
 
 /// When to try again with another quad size, and with which.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -47,6 +50,10 @@ impl Default for RetryOptions {
 #[derive(Clone)]
 pub(super) struct Shape {
     pub(super) skeleton: QuadSkeleton,
+    /// The layout of its quads.
+    pub(super) layout: Layout,
+    /// Why the regular layout was given up, if it was.
+    pub(super) regular_refused: Option<String>,
     pub(super) body: ThickenedBody,
     pub(super) fitted: Fitted,
     /// The body does not come from the skeleton but is wrapped around the proposal.
@@ -90,18 +97,21 @@ struct Workshop<'a> {
     base: &'a Base<'a>,
     /// A skeleton drawn elsewhere.
     drawn: Option<&'a Skeleton>,
+    layout: Layout,
     options: &'a ReconstructOptions,
     monitor: &'a Monitor,
 }
 
-/// Skeleton, thickening and fit; the first body that is sound and close enough wins, else the best of all tries. When
-/// none is sound, or all are far off, the body is wrapped around the proposal instead, but never around a design part:
-/// there the whole proposal is tried before.
+/// Skeleton, thickening and fit. Of [`Layout::Auto`] the regular layout comes first, once; its body is taken when it is close, or
+/// not farther than the one that comes of the plain layout. Of one layout the first body that is sound and close enough
+/// wins, else the best of all tries. When none is sound, or all are far off, the body is wrapped around the proposal
+/// instead, but never around a design part: there the whole proposal is tried before.
 pub(super) fn shape(
     record: &mut Record,
     axis: &MedialAxis,
     base: &Base,
     drawn: Option<&Skeleton>,
+    layout: Layout,
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Shape, PipelineError> {
@@ -110,10 +120,11 @@ pub(super) fn shape(
         axis,
         base,
         drawn,
+        layout,
         options,
         monitor,
     };
-    let tried = workshop.tries();
+    let tried = workshop.layouts();
     let finished = match &tried {
         Ok((score, _)) => score.usable(),
         Err(error) => error.is_cancelled() || options.retry.quad_sizes.is_empty(),
@@ -121,8 +132,9 @@ pub(super) fn shape(
     if finished || drawn.is_some() || base.united.is_some() {
         return tried.map(|(_, shape)| shape);
     }
-    let first = tried.as_ref().ok().map(|(_, shape)| shape.skeleton.clone());
-    if let Some((score, shape)) = workshop.wrapped(first)? {
+    let first = tried.as_ref().ok().map(|(_, shape)| shape);
+    let refused = first.and_then(|shape| shape.regular_refused.clone());
+    if let Some((score, shape)) = workshop.wrapped(first.map(|shape| shape.skeleton.clone()))? {
         let best = tried.as_ref().ok();
         if best.is_none_or(|(least, _)| score.worse() < least.worse()) {
             let quads = shape.body.mesh.quads.len();
@@ -130,13 +142,87 @@ pub(super) fn shape(
             if !score.good() {
                 monitor.warn("fit", format!("wrapped body: {score}"));
             }
-            return Ok(shape);
+            return Ok(Shape {
+                regular_refused: refused,
+                ..shape
+            });
         }
     }
     tried.map(|(_, shape)| shape)
 }
 
 impl Workshop<'_> {
+    /// The shape of the regular layout when that is good enough, else of the plain one.
+    fn layouts(&mut self) -> Result<(Score, Shape), PipelineError> {
+        let first = self.options.retry.quad_sizes.first();
+        let Some(&size) = first.filter(|_| self.layout == Layout::Auto && self.drawn.is_none())
+        else {
+            return self.tries();
+        };
+        let (close, told) = (self.options.retry.close, self.monitor.warnings().len());
+        self.layout = Layout::Regular;
+        let regular = self.regular(size);
+        self.layout = Layout::Plain;
+        match &regular {
+            Ok((score, _)) if score.close(close) => return regular,
+            Err(error) if error.is_cancelled() => return regular,
+            _ => {}
+        }
+        // What went wrong is said once, in the reason.
+        self.monitor.keep_warnings(told);
+        let plain = self.tries();
+        let refused = match (&regular, &plain) {
+            (_, Err(error)) if error.is_cancelled() => return plain,
+            (Err(error), _) => Some(error.source.to_string()),
+            (Ok((regular, _)), Ok((plain, _))) => regular.refused_for(plain, close),
+            (Ok((regular, _)), Err(_)) => (!regular.good()).then(|| regular.to_string()),
+        };
+        if refused.is_none() {
+            self.monitor.keep_warnings(told);
+            return regular;
+        }
+        plain.map(|(score, shape)| {
+            let shape = Shape {
+                regular_refused: refused,
+                ..shape
+            };
+            (score, shape)
+        })
+    }
+
+    /// The regular layout at one quad size, or at the next finer one when that is good but rough, and that one less so.
+    fn regular(&mut self, size: f64) -> Result<(Score, Shape), PipelineError> {
+        let (skeleton, body) = self.thickened(size)?;
+        let quads = body.mesh.quads.len();
+        if quads > MOST_QUADS {
+            return Err(PipelineError {
+                stage: "thicken",
+                source: StageError::LargeBody {
+                    quads,
+                    most: MOST_QUADS,
+                },
+            });
+        }
+        let tried = self.fitted(skeleton, body, false)?;
+        let rough = tried.0.good() && tried.0.rough > self.options.retry.close;
+        let finer = |&&other: &&f64| other < size && other >= FINE * size;
+        let Some(&finer) = self
+            .options
+            .retry
+            .quad_sizes
+            .iter()
+            .find(finer)
+            .filter(|_| rough)
+        else {
+            return Ok(tried);
+        };
+        match self.one(finer) {
+            Ok(fine) if fine.0.worse() < tried.0.worse() => Ok(fine),
+            Err(error) if error.is_cancelled() => Err(error),
+            _ => Ok(tried),
+        }
+    }
+
     /// The first good shape of all quad sizes, else the best.
     fn tries(&mut self) -> Result<(Score, Shape), PipelineError> {
         let sizes: &[f64] = if self.drawn.is_some() {
@@ -192,12 +278,17 @@ impl Workshop<'_> {
     }
 
     fn one(&mut self, size: f64) -> Result<(Score, Shape), PipelineError> {
+        let (skeleton, body) = self.thickened(size)?;
+        self.fitted(skeleton, body, false)
+    }
+
+    fn thickened(&mut self, size: f64) -> Result<(QuadSkeleton, ThickenedBody), PipelineError> {
         let skeleton = self.skeleton(size)?;
         let (options, monitor) = (&self.options.thicken, self.monitor);
         let body = self
             .record
             .stage("thicken", || thicken(&skeleton.skeleton, options, monitor))?;
-        self.fitted(skeleton, body, false)
+        Ok((skeleton, body))
     }
 
     /// The last resort for bulky parts: a quad mesh wrapped around the proposal, fitted like a thickened one. The
@@ -256,6 +347,8 @@ impl Workshop<'_> {
         let score = Score::of(&fitted, field.spacing, &self.options.report.limits);
         let shape = Shape {
             skeleton,
+            layout: self.layout,
+            regular_refused: None,
             body,
             fitted,
             wrapped,
@@ -267,6 +360,7 @@ impl Workshop<'_> {
     /// The quad skeleton at one quad size, or the one drawn elsewhere, with smooth radii.
     fn skeleton(&mut self, size: f64) -> Result<QuadSkeleton, PipelineError> {
         let mut sized = self.options.skeleton.clone();
+        sized.layout = self.layout;
         sized.size_factor *= size;
         sized.size_least *= size;
         sized.size_most *= size;

@@ -68,6 +68,29 @@ impl Part {
     }
 }
 
+/// As [`united`], told of.
+pub(super) fn judged(
+    surface: &Surface,
+    joined: Joined,
+    bodies: &mut Bodies,
+    intersections: usize,
+    voxel: f64,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Part, StageError> {
+    let part = united(
+        surface,
+        joined,
+        bodies,
+        intersections,
+        voxel,
+        options,
+        monitor,
+    )?;
+    part.tell(monitor);
+    Ok(part)
+}
+
 /// As [`united`], told of, but recognised bodies are taken away when no union with them is valid.
 #[cfg(feature = "occt")]
 pub(super) fn part(

@@ -207,6 +207,11 @@ pub struct TopologyBlock {
 /// The quad skeleton.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct SkeletonBlock {
+    /// Layout of its quads, `regular` or `plain`; `drawn` for a skeleton drawn elsewhere.
+    pub layout: String,
+    /// Why the regular layout was given up for the plain one; none when it was not tried.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub regular_refused: Option<String>,
     /// Quads.
     pub quads: usize,
     /// Edges without quads.

@@ -304,7 +304,11 @@ fn agreement(equal: bool) -> Markup {
 fn skeleton(block: &SkeletonBlock) -> Markup {
     html! {
         h2 { "Skeleton" }
+        @if let Some(why) = &block.regular_refused {
+            p { "The regular layout of its quads was given up: " (why) "." }
+        }
         (pairs(&[
+            ("Layout", block.layout.clone()),
             ("Quads", count(block.quads)),
             ("Beams", count(block.beams)),
             ("Sheets", count(block.sheets)),

@@ -8,15 +8,13 @@ use rayon::prelude::*;
 use super::body_valence::{Star, star};
 use super::coarsen::Sizing;
 use super::complex::Class;
+use super::layout::Effort;
 use super::quad_mesh::{Change, QuadMesh};
 use super::quad_moves::{collapse, open, rotate, shorten_rim};
 use super::reference::Reference;
 use super::shape_cost::{settle, shape_cost, smooth_near};
 use crate::monitor::{Cancelled, Monitor};
 
-/// Proposals a quad and search.
-const PROPOSALS: usize = 300;
-const MOST_PROPOSALS: usize = 200_000;
 /// Temperatures of the first and last proposal, in irregular body valences.
 const HOT: f64 = 2.5;
 const COLD: f64 = 0.3;
@@ -29,6 +27,7 @@ const SETTLINGS: usize = 24;
 pub(crate) struct Annealing<'a> {
     pub reference: &'a Reference,
     pub sizing: &'a Sizing,
+    pub effort: Effort,
     pub searches: usize,
     pub seed: u64,
 }
@@ -52,7 +51,7 @@ pub(crate) fn anneal(
             Search::new(mesh.clone(), annealing, seed).run(monitor)
         })
         .collect();
-    let mut best = (energy(mesh, annealing.sizing), None);
+    let mut best = (annealing.energy(mesh), None);
     let topology = mesh.betti();
     for (e, m) in found? {
         if e < best.0 && m.betti() == topology && !m.has_twins() {
@@ -62,14 +61,37 @@ pub(crate) fn anneal(
     Ok(best.1)
 }
 
-/// Cost of all vertices and quads.
-fn energy(m: &QuadMesh, sizing: &Sizing) -> f64 {
-    let vertices: f64 = (0..m.points.len() as u32)
-        .filter(|&v| !m.around[v as usize].is_empty())
-        .map(|v| star(m, v).map_or(100.0, |s| s.cost()))
-        .sum();
-    let quads: f64 = m.alive().map(|(_, q)| shape_cost(m, &q, sizing)).sum();
-    vertices + quads
+impl Annealing<'_> {
+    /// Cost of all vertices and quads.
+    fn energy(&self, m: &QuadMesh) -> f64 {
+        let vertices: f64 = (0..m.points.len() as u32)
+            .filter(|&v| !m.around[v as usize].is_empty())
+            .map(|v| star(m, v).map_or(100.0, |s| s.cost(self.effort.inner)))
+            .sum();
+        let quads: f64 = m.alive().map(|(_, q)| shape_cost(m, &q, self.sizing)).sum();
+        vertices + quads
+    }
+
+    /// Cost of the vertices.
+    fn cost(&self, stars: &[Star]) -> f64 {
+        stars.iter().map(|s| s.cost(self.effort.inner)).sum()
+    }
+
+    /// Cost of the vertices and of all quads around them.
+    fn local_energy(&self, m: &QuadMesh, vertices: &[u32]) -> Option<f64> {
+        let mut sum = 0.0;
+        let mut quads: Vec<u32> = Vec::with_capacity(40);
+        for &v in vertices {
+            sum += star(m, v)?.cost(self.effort.inner);
+            quads.extend(&m.around[v as usize]);
+        }
+        quads.sort_unstable();
+        quads.dedup();
+        for i in quads {
+            sum += shape_cost(m, &m.quad(i)?, self.sizing);
+        }
+        Some(sum)
+    }
 }
 
 struct Search<'a> {
@@ -88,8 +110,9 @@ impl<'a> Search<'a> {
     }
 
     fn run(mut self, monitor: &Monitor) -> Result<(f64, QuadMesh), Cancelled> {
-        let n = (PROPOSALS * self.m.alive().count()).min(MOST_PROPOSALS);
-        let mut best = (energy(&self.m, self.annealing.sizing), self.m.clone());
+        let effort = &self.annealing.effort;
+        let n = (effort.proposals * self.m.alive().count()).min(effort.most_proposals);
+        let mut best = (self.annealing.energy(&self.m), self.m.clone());
         for leg in 0..SETTLINGS {
             monitor.check()?;
             let t = leg as f64 / (SETTLINGS - 1) as f64;
@@ -98,7 +121,7 @@ impl<'a> Search<'a> {
                 self.step(temperature);
             }
             settle(&mut self.m, self.annealing.reference, 2);
-            let now = energy(&self.m, self.annealing.sizing);
+            let now = self.annealing.energy(&self.m);
             if now < best.0 {
                 best = (now, self.m.clone());
             }
@@ -148,7 +171,7 @@ impl<'a> Search<'a> {
         let arcs_before = arcs(&self.m, &touched);
         let undo = self.m.apply(change);
         let good = stars(&self.m, &touched).is_some_and(|after| {
-            cost(&after) - cost(&before) <= most
+            self.annealing.cost(&after) - self.annealing.cost(&before) <= most
                 && valid(&self.m, change, &touched, &before, &after)
                 && (change.shortens_rim || arcs(&self.m, &touched) == arcs_before)
         });
@@ -157,11 +180,10 @@ impl<'a> Search<'a> {
     }
 
     fn take(&mut self, change: &Change, touched: &[u32], allowance: f64) -> bool {
-        let sizing = self.annealing.sizing;
-        let before = local_energy(&self.m, touched, sizing);
+        let before = self.annealing.local_energy(&self.m, touched);
         let mut undo = self.m.apply(change);
         smooth_near(&mut self.m, touched, &mut undo);
-        let after = local_energy(&self.m, touched, sizing);
+        let after = self.annealing.local_energy(&self.m, touched);
         let good = matches!((before, after), (Some(b), Some(a)) if a - b <= allowance);
         if !good {
             self.m.undo(undo);
@@ -203,10 +225,6 @@ fn stars(m: &QuadMesh, vertices: &[u32]) -> Option<Vec<Star>> {
     vertices.iter().map(|&v| star(m, v)).collect()
 }
 
-fn cost(stars: &[Star]) -> f64 {
-    stars.iter().map(Star::cost).sum()
-}
-
 /// Does the mesh around a change still have the same sheets, and valid quads?
 fn valid(m: &QuadMesh, change: &Change, touched: &[u32], before: &[Star], after: &[Star]) -> bool {
     for ((&v, old), new) in touched.iter().zip(before).zip(after) {
@@ -226,22 +244,6 @@ fn valid(m: &QuadMesh, change: &Change, touched: &[u32], before: &[Star], after:
         m.around[q[0] as usize].iter().filter(|i| twin(i)).count() == 1
             && (0..4).all(|k| !m.beams[q[k] as usize].contains(&q[(k + 1) % 4]))
     })
-}
-
-/// Cost of the vertices and of all quads around them.
-fn local_energy(m: &QuadMesh, vertices: &[u32], sizing: &Sizing) -> Option<f64> {
-    let mut sum = 0.0;
-    let mut quads: Vec<u32> = Vec::with_capacity(40);
-    for &v in vertices {
-        sum += star(m, v)?.cost();
-        quads.extend(&m.around[v as usize]);
-    }
-    quads.sort_unstable();
-    quads.dedup();
-    for i in quads {
-        sum += shape_cost(m, &m.quad(i)?, sizing);
-    }
-    Some(sum)
 }
 
 /// SplitMix64 (Steele et al. 2014).
@@ -269,6 +271,7 @@ impl Random {
 mod tests {
     use super::super::arcs;
     use super::super::complex::Complex;
+    use super::super::layout::Layout;
     use super::super::polygons::Polygon;
     use super::*;
     use crate::Vec3;
@@ -328,6 +331,7 @@ mod tests {
         let annealing = Annealing {
             reference: &reference,
             sizing: &SIZING,
+            effort: Layout::Plain.effort(),
             searches: 3,
             seed: 1,
         };

@@ -102,13 +102,14 @@ impl Star {
         }
     }
 
-    /// What the body's vertices here cost: nothing when all are regular.
-    pub fn cost(&self) -> f64 {
+    /// What the body's vertices here cost: nothing when all are regular. Irregular ones inside a sheet cost `inner` more.
+    pub fn cost(&self, inner: f64) -> f64 {
         let k = |i: usize| self.fans[i].quads;
         let closed = |f: &Fan| f.rims + f.seams == 0;
         let fans = &self.fans[..self.count];
         match (self.count, self.rims, self.seams, self.beams) {
             (0, ..) => 0.0,
+            (1, 0, 0, 0) if k(0) != 4 => inner + 2.0 * price(k(0)),
             // Inside a sheet; a beam stands on one side.
             (1, 0, 0, beams) => price(k(0) + beams as i64) + price(k(0)),
             (1, 2, 0, 0) => 2.0 * price(k(0) + 2),

@@ -9,6 +9,7 @@ use super::check::{check, check_cells, check_points};
 use super::coarsen::{Sizing, coarsen};
 use super::complex::{Class, Complex};
 use super::edges::edge;
+use super::layout::Layout;
 use super::members::burn_members;
 use super::pairing::{make_even, pair, split_all, split_rims};
 use super::polygons::Polygon;
@@ -43,9 +44,11 @@ pub struct SkeletonOptions {
     pub size_least: f64,
     /// Longest edge length over the part's median radius.
     pub size_most: f64,
+    /// How the quads are laid out.
+    pub layout: Layout,
     /// Rows of quads are split in the end so that quads are this many times as short; no irregular vertex comes with them. 1
-    /// leaves the quads as laid out.
-    pub split: f64,
+    /// leaves the quads as laid out. Default: 1.43 for the regular layout, else 1.
+    pub split: Option<f64>,
     /// Sheets narrower than this many radii become beams; 0 keeps them.
     pub member_width: f64,
     /// Sheets smaller than the square of this many radii become beams; 0 keeps them.
@@ -67,7 +70,8 @@ impl Default for SkeletonOptions {
             size_factor: 1.8,
             size_least: 2.0,
             size_most: 5.6,
-            split: 1.0,
+            layout: Layout::Plain,
+            split: None,
             member_width: 1.2,
             member_size: 4.0,
             spur: 0.6,
@@ -79,6 +83,10 @@ impl Default for SkeletonOptions {
 }
 
 impl SkeletonOptions {
+    fn splits(&self) -> f64 {
+        self.split.unwrap_or(self.layout.split())
+    }
+
     fn check(&self, spacing: f64) -> Result<(), SkeletonError> {
         let inside = |good: bool, name, value: f64, range| {
             if good && value.is_finite() {
@@ -95,9 +103,9 @@ impl SkeletonOptions {
         positive("skeleton.size_least", self.size_least)?;
         positive("skeleton.size_most", self.size_most)?;
         inside(
-            (1.0..=8.0).contains(&self.split),
+            (1.0..=8.0).contains(&self.splits()),
             "skeleton.split",
-            self.split,
+            self.splits(),
             "1 to 8",
         )?;
         not_negative("skeleton.member_width", self.member_width)?;
@@ -126,7 +134,7 @@ impl SkeletonOptions {
 /// 4. Make every sheet even, pair its triangles by maximum-weight matching, never across a seam; leftovers get a rim
 ///    vertex or meet by a triangle walk; doublets, bad diagonals and edges are cleaned up.
 /// 5. Anneal the quads toward few irregular vertices of the thickened body, rims and seams kept; square them up.
-/// 6. When asked, split every chord (row of quads, over all sheets of a seam) into strips: all new vertices are regular.
+/// 6. In the regular layout, or when asked, split every chord (row of quads, over all sheets of a seam) into strips: all new vertices are regular.
 ///
 /// The Betti numbers of `medial` are asserted after each phase. A point of `medial` that nothing uses counts as a
 /// component of its own (a ball). All faces are quads in every case; when a sheet resists, all faces are split in the
@@ -369,6 +377,7 @@ fn quads(
         let annealing = Annealing {
             reference,
             sizing,
+            effort: options.layout.effort(),
             searches: options.searches,
             seed: options.seed,
         };
@@ -378,8 +387,8 @@ fn quads(
             (points, radii) = (better.points, better.radii);
         }
         square_up(&mut points, &mut radii, &polygons, &beams, reference);
-        if options.split > 1.0 {
-            let wanted = sizing.times(1.0 / options.split);
+        if options.splits() > 1.0 {
+            let wanted = sizing.times(1.0 / options.splits());
             split_chords(&mut points, &mut radii, &mut polygons, reference, &wanted);
             let mut m = QuadMesh::new(&points, &radii, &polygons, &beams);
             settle(&mut m, reference, SETTLE_ROUNDS);

@@ -10,6 +10,7 @@ mod complex;
 mod cut;
 mod edges;
 mod error;
+mod layout;
 mod members;
 mod nearest;
 mod pairing;
@@ -29,6 +30,7 @@ pub use build::{SkeletonOptions, quad_skeleton};
 pub use check::check;
 pub(crate) use edges::{EdgeTable, UnionFind, edge};
 pub use error::SkeletonError;
+pub use layout::Layout;
 pub(crate) use nearest::PointGrid;
 pub use stats::{Deviation, Range, SkeletonStats, stats, topology};
 
