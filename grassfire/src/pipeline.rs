@@ -227,6 +227,8 @@ struct Prepared {
     remeshed: Remeshed,
     /// What the list of edits made of it, when there is one.
     edited: Option<Remeshed>,
+    /// The surface that was read is noise.
+    noisy: bool,
 }
 
 /// The first stages of [`rebuild`]: reading, recognition, remesh, edits.
@@ -256,13 +258,14 @@ fn prepared(
         bodies,
         remeshed,
         edited,
+        noisy: proposal.is_noise(),
     })
 }
 
-/// With feeders the plain layout: a body that grows does it in many fits, of few quads the better.
-fn first_layout(options: &ReconstructOptions) -> Layout {
+/// The plain layout with feeders, because a body that grows does it in many fits, of few quads the better; and for noise.
+fn first_layout(options: &ReconstructOptions, noisy: bool) -> Layout {
     match options.skeleton.layout {
-        Layout::Auto if options.feed.active() => Layout::Plain,
+        Layout::Auto if noisy || options.feed.active() => Layout::Plain,
         layout => layout,
     }
 }
@@ -290,6 +293,7 @@ fn rebuild(
         mut bodies,
         remeshed,
         edited,
+        noisy,
     } = prepared(record, job, monitor)?;
     // Undercuts last: whatever the edits did, none are left.
     let from = edited.as_ref().unwrap_or(&remeshed);
@@ -318,6 +322,7 @@ fn rebuild(
         Some(_) => None,
         None => feeding::edit(record, &original, &bodies, options, monitor)?,
     };
+    let layout = first_layout(options, noisy);
     let mut site = Site {
         record,
         remeshed: &original,
@@ -328,7 +333,7 @@ fn rebuild(
         monitor,
         must_grow: false,
         grown: None,
-        layout: first_layout(options),
+        layout,
         regular_refused: None,
     };
     let made = match &fed {

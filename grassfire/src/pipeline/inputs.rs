@@ -16,6 +16,9 @@ use crate::report::{InputBlock, InputFile, RepairEntry};
 use crate::skeleton::{self, Skeleton};
 use crate::voxel::VoxelGrid;
 
+/// Share of faces that run through others in a surface that is noise.
+const NOISE: f64 = 0.05;
+
 /// The proposal as read and repaired.
 pub(super) enum Proposal {
     Mesh {
@@ -38,6 +41,15 @@ impl Proposal {
                 Some((grid.origin, grid.origin + Vec3::from(size)))
             }
         }
+    }
+
+    /// So many of its faces run through others that its skeleton's quads need not be laid out twice.
+    pub(super) fn is_noise(&self) -> bool {
+        let (Self::Mesh { report, .. } | Self::Density { report, .. }) = self;
+        let found = report.repairs.iter();
+        let found = found.filter(|r| r.kind == RepairKind::SelfIntersection);
+        let crossing: usize = found.map(|r| r.count).sum();
+        crossing as f64 > NOISE * report.triangles as f64
     }
 
     /// The `input` block of the report.

@@ -48,6 +48,9 @@ pub(super) const FINE: f64 = 0.75;
 /// A regular layout whose body is within this of the proposal everywhere is taken without making another one, voxels.
 const NEAR: f64 = 1.5;
 
+/// Distances of two fits that differ by less are the same.
+const SAME: f64 = 1.1;
+
 /// How good a fitted body is.
 pub(super) struct Score {
     /// Places where it cuts itself.
@@ -116,7 +119,7 @@ impl Score {
         if !self.good() {
             return Some(self.to_string());
         }
-        let farther = |mine: f64, other: f64, limit: f64| mine > other.max(limit);
+        let farther = |mine: f64, other: f64, limit: f64| mine > SAME * other.max(limit);
         let refused = other.good()
             && (farther(self.rough, other.rough, close)
                 || farther(self.farthest, other.farthest, NEAR));

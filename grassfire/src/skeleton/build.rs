@@ -70,7 +70,7 @@ impl Default for SkeletonOptions {
             size_factor: 1.8,
             size_least: 2.0,
             size_most: 5.6,
-            layout: Layout::Plain,
+            layout: Layout::Auto,
             split: None,
             member_width: 1.2,
             member_size: 4.0,

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 pub enum Layout {
     /// The regular one where its body follows the proposal closely, else the plain one. Where no body is made of the skeleton
     /// (edits, feeding) and with feeders the plain one.
+    #[default]
     Auto,
     /// Quads of the wanted size with few irregular vertices of the body.
-    #[default]
     Plain,
     /// Searched four times as long, with dearer irregular vertices inside sheets, and then every row of quads split:
     /// twice as many quads, nearly all vertices inside sheets with four of them.
