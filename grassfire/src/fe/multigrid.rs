@@ -12,9 +12,11 @@ use super::stencil::Stencil;
 use super::window::Window;
 use super::{FeError, SolverOptions, element, transfer};
 
-/// Power iterations for the largest eigenvalue of a coarse level: the first time, and after small changes.
+/// Power iterations for the largest eigenvalue of a coarse level: the first time, after small changes, and where the cycle was not
+/// positive.
 const POWER_FIRST: usize = 16;
 const POWER_WARM: usize = 4;
+pub(super) const POWER_AGAIN: usize = 60;
 /// The power iteration stays below the largest eigenvalue by less than this factor.
 const POWER_MARGIN: f64 = 1.1;
 /// Visits of the coarser levels below the second: a W cycle where it costs little.
@@ -100,29 +102,40 @@ impl Multigrid {
     pub fn set(&mut self, Fine { frame, e }: Fine) -> Result<(), FeError> {
         let elements = galerkin::elements(frame, &self.coarsest, &self.tables, e);
         self.coarse.factor(&self.coarsest, &elements)?;
-        let options = &self.options;
         for level in &mut self.levels {
-            let mut work = 1;
-            let high = match (&mut level.operator, &mut level.diagonal) {
+            match (&mut level.operator, &mut level.diagonal) {
                 (Operator::Fine(_), Diagonal::Node(inverse)) => {
                     node_diagonal(&level.grid, e, self.unit.0, inverse);
-                    self.unit.1
                 }
                 (Operator::Coarse(stencil, tables), Diagonal::Component(inverse)) => {
                     galerkin::fill(frame, &level.grid, tables, e, stencil);
                     component_diagonal(&level.grid, stencil, inverse);
-                    work = COARSE_WORK;
-                    POWER_MARGIN * level.largest_eigenvalue()
                 }
-                _ => continue,
-            };
-            level.coefficients = smoother::coefficients(
-                work * options.smoother_degree,
-                high,
-                work as f64 * options.smoother_ratio,
-            );
+                _ => {}
+            }
         }
+        self.set_smoothers(POWER_WARM);
         Ok(())
+    }
+
+    /// Estimates the largest eigenvalues of the coarse levels anew, from so many power iterations at least.
+    pub fn set_smoothers(&mut self, rounds: usize) {
+        let (degree, ratio) = (self.options.smoother_degree, self.options.smoother_ratio);
+        for level in &mut self.levels {
+            let (work, high) = match level.operator {
+                Operator::Fine(_) => (1, self.unit.1),
+                Operator::Coarse(..) => {
+                    let first = level.coefficients.is_empty();
+                    let rounds = if first {
+                        POWER_FIRST.max(rounds)
+                    } else {
+                        rounds
+                    };
+                    (COARSE_WORK, POWER_MARGIN * level.largest_eigenvalue(rounds))
+                }
+            };
+            level.coefficients = smoother::coefficients(work * degree, high, work as f64 * ratio);
+        }
     }
 
     /// One cycle for the residual `r`; the result is [`Multigrid::result`].
@@ -230,18 +243,13 @@ impl Level {
     }
 
     /// Largest eigenvalue of D^-1 K by power iteration from the last vector.
-    fn largest_eigenvalue(&mut self) -> f64 {
+    fn largest_eigenvalue(&mut self, rounds: usize) -> f64 {
         let (Operator::Coarse(stencil, _), Diagonal::Component(inverse)) =
             (&self.operator, &self.diagonal)
         else {
             return 0.0;
         };
         let mut largest = 0.0;
-        let rounds = if self.coefficients.is_empty() {
-            POWER_FIRST
-        } else {
-            POWER_WARM
-        };
         for _ in 0..rounds {
             stencil.apply(&self.grid, &self.probe, &mut self.t);
             let before = dot(&self.probe, &self.probe).sqrt();

@@ -6,7 +6,7 @@ use super::energy::add_energies;
 use super::frame::Frame;
 use super::grid::NodeGrid;
 use super::matrix_free::MatrixFree;
-use super::multigrid::{Fine, Multigrid};
+use super::multigrid::{Fine, Multigrid, POWER_AGAIN};
 use super::pcg::{self, SolveStats};
 use super::{FeError, SolverOptions, element, galerkin};
 use crate::monitor::Monitor;
@@ -26,6 +26,8 @@ pub struct VoxelModel {
     pub loads: Vec<Vec<([usize; 3], [f64; 3])>>,
 }
 
+/// Times that a solution is begun: conjugate gradients end early when the cycle is not positive.
+const TRIES: usize = 2;
 /// Most levels of a hierarchy.
 const MAX_LEVELS: usize = 7;
 /// Unknowns that are always few enough for a direct solution, and their share of those of the finest grid that is: the
@@ -146,27 +148,40 @@ impl Solver {
             self.places[self.last] = Some(place);
             self.last = case;
         }
-        let limits = (self.options.tolerance, self.options.max_iterations);
-        let stats = pcg::solve(
-            Fine {
+        let (tolerance, most) = (self.options.tolerance, self.options.max_iterations);
+        let mut stats = SolveStats::default();
+        for _ in 0..TRIES {
+            let fine = Fine {
                 frame: &self.frame,
                 e: &self.e,
-            },
-            &self.operator,
-            &mut self.multigrid,
-            &self.right[case],
-            &mut self.u,
-            limits,
-            monitor,
-        )?;
-        if stats.converged {
-            return Ok(stats);
+            };
+            let found = pcg::solve(
+                fine,
+                &self.operator,
+                &mut self.multigrid,
+                &self.right[case],
+                &mut self.u,
+                (tolerance, most - stats.iterations),
+                monitor,
+            )?;
+            stats = SolveStats {
+                iterations: stats.iterations + found.iterations,
+                ..found
+            };
+            if stats.converged {
+                return Ok(stats);
+            }
+            if stats.iterations >= most {
+                break;
+            }
+            // The cycle was not positive: an eigenvalue was estimated too low.
+            self.multigrid.set_smoothers(POWER_AGAIN);
         }
         Err(FeError::NotConverged {
             case,
             iterations: stats.iterations,
             residual: stats.residual,
-            tolerance: self.options.tolerance,
+            tolerance,
         })
     }
 
