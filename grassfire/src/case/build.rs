@@ -220,13 +220,6 @@ fn nodes<'a>(
 ) -> Nodes<'a> {
     let counts = problem.dims.map(|n| n + 1);
     let total = counts.iter().product();
-    let at = |i: usize| {
-        [
-            i % counts[0],
-            i / counts[0] % counts[1],
-            i / (counts[0] * counts[1]),
-        ]
-    };
     let touch = |voxels: &mut dyn Iterator<Item = usize>| {
         let mut out = vec![false; total];
         for v in voxels {
@@ -242,7 +235,9 @@ fn nodes<'a>(
     Nodes {
         case,
         folder,
-        places: (0..total).map(|i| problem.node(at(i))).collect(),
+        places: (0..total)
+            .map(|i| problem.node(problem.at_node(i)))
+            .collect(),
         slack: problem.h,
         active: touch(&mut all.clone().filter(|&v| problem.is_active(v))),
         frozen: touch(&mut all.filter(|&v| problem.labels[v] == FROZEN)),
@@ -262,19 +257,11 @@ fn conditions(
     infos: &mut Vec<SelectionInfo>,
     monitor: &Monitor,
 ) -> Result<(Fixed, Vec<LoadCase>), CaseError> {
-    let counts = problem.dims.map(|n| n + 1);
-    let at = |i: usize| {
-        [
-            i % counts[0],
-            i / counts[0] % counts[1],
-            i / (counts[0] * counts[1]),
-        ]
-    };
     let mut fixed = Vec::new();
     for support in &nodes.case.support {
         let found = resolve(nodes, &support.on, "support", infos, monitor)?;
         for axis in support.fix.chars().filter_map(|c| "xyz".find(c)) {
-            fixed.extend(found.iter().map(|&i| (at(i), axis)));
+            fixed.extend(found.iter().map(|&i| (problem.at_node(i), axis)));
         }
     }
     fixed.sort_unstable();
@@ -285,7 +272,7 @@ fn conditions(
         for load in &table.loads {
             let found = resolve(nodes, &load.on, "load", infos, monitor)?;
             let spread = spread(nodes, problem, &found, load)?;
-            forces.extend(found.iter().map(|&i| at(i)).zip(spread));
+            forces.extend(found.iter().map(|&i| problem.at_node(i)).zip(spread));
         }
         cases.push(LoadCase {
             name: table.name.clone(),

@@ -132,7 +132,8 @@ fn add_bearing(
 /// For the chosen nodes (ascending numbers in `[z][y][x]` order) the area of the faces between a voxel with material and one
 /// without that have all four corners among them, a quarter to each corner; outward.
 pub(super) fn exposed(problem: &Problem, nodes: &[usize]) -> Vec<Vec3> {
-    let counts = problem.dims.map(|n| n + 1);
+    let [nx, ny, _] = problem.dims.map(|n| n + 1);
+    let strides = [1, nx, nx * ny];
     let mut areas = vec![Vec3::zeros(); nodes.len()];
     let quarter = problem.h * problem.h / 4.0;
     let active = |at: [Option<usize>; 3]| {
@@ -143,12 +144,7 @@ pub(super) fn exposed(problem: &Problem, nodes: &[usize]) -> Vec<Vec3> {
         inside && problem.is_active(problem.index([x, y, z]))
     };
     for &node in nodes {
-        let at = [
-            node % counts[0],
-            node / counts[0] % counts[1],
-            node / (counts[0] * counts[1]),
-        ];
-        let strides = [1, counts[0], counts[0] * counts[1]];
+        let at = problem.at_node(node);
         // The face across each axis of which this node is the lower corner.
         for axis in 0..3 {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);

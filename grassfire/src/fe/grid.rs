@@ -93,6 +93,25 @@ impl NodeGrid {
         &self.runs[self.rows[row]..self.rows[row + 1]]
     }
 
+    /// Writes a row out in full, node x at `BLOCK + x`, with zeros where nothing is stored. `plane`: a component of the row's
+    /// plane, from its first place.
+    #[inline(always)]
+    pub fn write_out<F: Copy, T: Copy + Default>(
+        &self,
+        plane: &[F],
+        [y, z]: [usize; 2],
+        convert: impl Fn(F) -> T,
+        to: &mut [T],
+    ) {
+        to.fill(T::default());
+        for run in self.row(y, z) {
+            let from = &plane[run.at..][..run.len];
+            for (to, &v) in to[BLOCK + run.x..][..run.len].iter_mut().zip(from) {
+                *to = convert(v);
+            }
+        }
+    }
+
     /// Stored nodes of a plane.
     #[inline]
     pub fn count(&self, z: usize) -> usize {

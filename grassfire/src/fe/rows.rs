@@ -1,14 +1,11 @@
 //! Rows of nodes around the rows of elements of a slab, written out in full, and the forces on them.
 
-use std::ops::{Add, AddAssign, Range, Sub};
+use std::ops::{Add, Range, Sub};
 
 use super::grid::{BLOCK, NodeGrid};
 
 /// What forces are added with.
-pub(super) trait Number:
-    Copy + Default + Add<Output = Self> + Sub<Output = Self> + AddAssign
-{
-}
+pub(super) trait Number: Copy + Default + Add<Output = Self> + Sub<Output = Self> {}
 impl Number for f32 {}
 impl Number for f64 {}
 
@@ -113,14 +110,7 @@ impl<T: Number> Rows<T> {
                 for c in 0..3 {
                     let from = 3 * grid.first(z) + c * grid.count(z);
                     let plain = self.plain.row_mut(0);
-                    plain.fill(T::default());
-                    for run in grid.row(y, z) {
-                        let from = &field[from + run.at..][..run.len];
-                        let to = &mut plain[BLOCK + run.x..][..run.len];
-                        for (to, &v) in to.iter_mut().zip(from) {
-                            *to = convert(v);
-                        }
-                    }
+                    grid.write_out(&field[from..], [y, z], &convert, plain);
                     let (at, row) = (number(plane, y, c, 0), self.plain.row(0));
                     let to = self.nodes.row_mut(at);
                     for (to, (&at, &next)) in to.iter_mut().zip(row.iter().zip(&row[1..])) {
@@ -145,14 +135,12 @@ impl<T: Number> Rows<T> {
         y: usize,
         z: usize,
     ) {
-        let moduli = self.moduli.row_mut(0);
-        moduli.fill(T::default());
-        for run in grid.row(y, z) {
-            let from = &e[grid.first(z) + run.at..][..run.len];
-            for (to, &v) in moduli[BLOCK + run.x..].iter_mut().zip(from) {
-                *to = convert(v);
-            }
-        }
+        grid.write_out(
+            &e[grid.first(z)..],
+            [y, z],
+            &convert,
+            self.moduli.row_mut(0),
+        );
     }
 
     /// The elements of row y, layer z, of one order a component.

@@ -48,20 +48,16 @@ impl<T: Copy + Default> Window<T> {
                 for c in 0..self.components {
                     let first = ((above % 3 * 3 + dz) * self.components + c) * self.width;
                     let row = &mut self.rows[first..first + self.width];
-                    row.fill(T::default());
                     let (Some(y), Some(z)) = (above.checked_sub(1), (z + dz).checked_sub(1)) else {
+                        row.fill(T::default());
                         continue;
                     };
                     if y > grid.n[1] || z > grid.n[2] {
+                        row.fill(T::default());
                         continue;
                     }
                     let plane = self.components * grid.first(z) + c * grid.count(z);
-                    for run in grid.row(y, z) {
-                        let from = &field[plane + run.at..][..run.len];
-                        for (to, &v) in row[BLOCK + run.x..][..run.len].iter_mut().zip(from) {
-                            *to = convert(v);
-                        }
-                    }
+                    grid.write_out(&field[plane..], [y, z], &convert, row);
                 }
             }
         }

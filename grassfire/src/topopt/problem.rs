@@ -110,6 +110,12 @@ impl Problem {
         out
     }
 
+    /// (x, y, z) of a node, counted in the order `[z][y][x]`.
+    pub fn at_node(&self, node: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.dims.map(|n| n + 1);
+        [node % nx, node / nx % ny, node / (nx * ny)]
+    }
+
     /// Position of a node, mm.
     pub fn node(&self, [x, y, z]: [usize; 3]) -> Vec3 {
         self.origin + self.h * Vec3::new(x as f64, y as f64, z as f64)
