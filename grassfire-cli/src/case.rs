@@ -162,8 +162,8 @@ fn describe(case: &Case, built: &Built) -> String {
     let cell = problem.h.powi(3);
     let design = problem.count(grassfire::topopt::DESIGN);
     let frozen = problem.count(grassfire::topopt::FROZEN);
-    let memory =
-        grassfire::fe::memory_estimate((design + frozen) as f64, problem.cases.len()) / 1e6;
+    let (cases, weighs) = (problem.cases.len(), problem.has_body_force());
+    let memory = grassfire::fe::memory_estimate((design + frozen) as f64, cases, weighs) / 1e6;
     let mut text = format!(
         "{}\ngrid        {nx} x {ny} x {nz} voxels of {} mm, about {memory:.0} MB\nspace       {} voxels, {:.0} mm3\nnon-design  {frozen} voxels, {:.0} mm3\n",
         case.title,
@@ -207,6 +207,13 @@ fn describe(case: &Case, built: &Built) -> String {
             place(sum),
             load_case.forces.len()
         );
+        if load_case.body_force != [0.0; 3] {
+            let full = (design + frozen) as f64 * cell;
+            text += &format!(
+                "  weight {} N if the space were full\n",
+                place(load_case.body_force.map(|f| f * full))
+            );
+        }
     }
     text
 }

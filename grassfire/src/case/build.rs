@@ -278,6 +278,7 @@ fn conditions(
             name: table.name.clone(),
             weight: table.weight,
             forces,
+            body_force: table.body_force(&nodes.case.material).into(),
         });
     }
     Ok((fixed, cases))

@@ -53,7 +53,8 @@ pub(crate) fn place(
     let dims = counts.map(|n| n.min(1e9) as usize);
     let voxels = counts.iter().product::<f64>();
     let filled = voxels.min(filled / h.powi(3));
-    let needed = memory_estimate(filled, case.case.len()).max(PER_VOXEL * voxels) / 1e6;
+    let weighs = case.case.iter().any(|table| table.gravity.is_some());
+    let needed = memory_estimate(filled, case.case.len(), weighs).max(PER_VOXEL * voxels) / 1e6;
     if needed > limit || counts.iter().any(|&n| n >= 1e9) {
         return Err(CaseError::Problem(TopoptError::Fe(FeError::Memory {
             voxels,

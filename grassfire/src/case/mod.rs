@@ -30,6 +30,7 @@ pub(crate) use places::Places;
 pub use select::Selector;
 pub use shape::Shape;
 
+use crate::Vec3;
 use crate::fe::SolverOptions;
 use crate::pipeline::ReconstructOptions;
 use crate::topopt::OptimizeOptions;
@@ -159,6 +160,9 @@ pub struct LoadCaseTable {
     pub weight: f64,
     /// Loads that act together.
     pub loads: Vec<Load>,
+    /// Acceleration that pulls on all of the part, mm/s2, such as `[0, 0, -9810]` for gravity along -z; a part that is itself
+    /// accelerated by a feels -a. The mass follows the design.
+    pub gravity: Option<[f64; 3]>,
 }
 
 impl Default for LoadCaseTable {
@@ -167,7 +171,16 @@ impl Default for LoadCaseTable {
             name: String::new(),
             weight: 1.0,
             loads: Vec::new(),
+            gravity: None,
         }
+    }
+}
+
+impl LoadCaseTable {
+    /// Force on a volume of full material, N/mm3.
+    pub fn body_force(&self, material: &Material) -> Vec3 {
+        let density = material.density.unwrap_or_default();
+        density * Vec3::from(self.gravity.unwrap_or_default())
     }
 }
 
@@ -240,6 +253,14 @@ impl Case {
         if !(-0.9..=0.49).contains(&self.material.nu) {
             return Err(value("material.nu", self.material.nu, "-0.9 to 0.49"));
         }
+        if let Some(density) = self.material.density
+            && !(density > 0.0 && density <= HEAVIEST)
+        {
+            let wanted = format!(
+                "t/mm3, above 0 and at most {HEAVIEST:e} (osmium has 2.3e-8): 1e-9 times that in g/cm3"
+            );
+            return Err(value("material.density", density, wanted));
+        }
         if self.case.is_empty() {
             return Err(value("case", "empty", "at least one load case"));
         }
@@ -272,11 +293,17 @@ impl Case {
                 "0 or more",
             ));
         }
-        if case.loads.is_empty() {
+        let gravity = format!("case[{i}].gravity");
+        finite(&gravity, case.gravity.iter().flatten())?;
+        if case.gravity.is_some() && self.material.density.is_none() {
+            let wanted = "given, t/mm3, because case has gravity; steel has 7.85e-9";
+            return Err(value("material.density", "missing", wanted));
+        }
+        if case.loads.is_empty() && case.gravity.unwrap_or_default() == [0.0; 3] {
             return Err(value(
                 &format!("case[{i}].loads"),
                 "empty",
-                "at least one load",
+                "at least one load, or gravity",
             ));
         }
         for (j, load) in case.loads.iter().enumerate() {
@@ -337,6 +364,8 @@ impl Case {
 
 /// No material is stiffer, MPa.
 const HARDEST: f64 = 2e6;
+/// No material is heavier, t/mm3.
+const HEAVIEST: f64 = 3e-8;
 
 /// A value that means nothing.
 fn value(key: &str, value: impl ToString, wanted: impl Into<String>) -> CaseError {

@@ -109,6 +109,10 @@ fn bad_cases_are_refused_by_name() {
         "{ file = { path = \"nothing.stl\" } }, { box = ",
     );
     assert!(matches!(e, CaseError::MissingFile { .. }), "{e}");
+    let e = broken("nu = 0.3", "nu = 0.3\ndensity = 7850.0");
+    assert!(e.to_string().contains("t/mm3"), "{e}");
+    let e = broken("[optimize]", "gravity = [0, 0, -9810]\n[optimize]");
+    assert!(e.to_string().contains("material.density"), "{e}");
     let e = broken("{ on = \"ring\", force", "{ on = \"corner\", moment");
     assert!(matches!(e, CaseError::Moment { .. }), "{e}");
 }

@@ -23,6 +23,7 @@ mod solver;
 mod stencil;
 mod stress;
 mod transfer;
+mod weight;
 mod window;
 
 #[cfg(test)]

@@ -5,11 +5,11 @@ use rayon::prelude::*;
 use super::coarse::Coarse;
 use super::frame::Frame;
 use super::galerkin::{self, Tables};
-use super::grid::{BLOCK, NodeGrid, dot};
+use super::grid::{NodeGrid, dot};
 use super::matrix_free::{MatrixFree, hold};
 use super::smoother::{self, Diagonal, Vectors};
 use super::stencil::Stencil;
-use super::window::Window;
+use super::window::sums_around;
 use super::{FeError, SolverOptions, element, transfer};
 
 /// Power iterations for the largest eigenvalue of a coarse level: the first time, after small changes, and where the cycle was not
@@ -295,32 +295,14 @@ fn start(grid: &NodeGrid) -> Vec<f32> {
 
 /// Inverse diagonal of the finest grid: all three entries of a node are `k` times the sum of the moduli around it.
 fn node_diagonal(grid: &NodeGrid, e: &[f64], k: f64, inverse: &mut [f32]) {
-    let planes = grid.planes(1, inverse).enumerate();
-    planes.for_each_init(
-        || Window::new(grid, 1),
-        |around, (z, out)| {
-            around.clear();
-            for y in 0..=grid.n[1] {
-                around.load(grid, e, |v| v as f32, y, z);
-                for run in grid.row(y, z) {
-                    for (x, inverse) in (run.x..).zip(&mut out[run.at..][..run.len]) {
-                        let sum: f64 = (0..8)
-                            .map(|i| {
-                                around.row(y, 1 - (i >> 1 & 1), 1 - (i >> 2), 0)
-                                    [BLOCK + x - (i & 1)]
-                            })
-                            .map(f64::from)
-                            .sum();
-                        *inverse = if sum > 0.0 {
-                            (1.0 / (k * sum)) as f32
-                        } else {
-                            0.0
-                        };
-                    }
-                }
-            }
-        },
-    );
+    let of_sum = |sum: f64| {
+        if sum > 0.0 {
+            (1.0 / (k * sum)) as f32
+        } else {
+            0.0
+        }
+    };
+    sums_around(grid, e, inverse, of_sum);
 }
 
 /// Inverse diagonal of a stencil.

@@ -8,6 +8,7 @@ use super::grid::NodeGrid;
 use super::matrix_free::MatrixFree;
 use super::multigrid::{Fine, Multigrid, POWER_AGAIN};
 use super::pcg::{self, SolveStats};
+use super::weight::{Weight, add_work};
 use super::{FeError, SolverOptions, element, galerkin};
 use crate::monitor::Monitor;
 
@@ -24,6 +25,20 @@ pub struct VoxelModel {
     pub fixed: Vec<([usize; 3], usize)>,
     /// For every load case the forces on nodes, N.
     pub loads: Vec<Vec<([usize; 3], [f64; 3])>>,
+    /// For every load case the force on a volume of full material, N/mm3; may be empty when there is none.
+    pub body_forces: Vec<[f64; 3]>,
+}
+
+impl VoxelModel {
+    /// The body force of a case, N/mm3; none where it is zero.
+    fn body_force(&self, case: usize) -> Option<[f64; 3]> {
+        let force = self.body_forces.get(case).copied();
+        force.filter(|f| *f != [0.0; 3])
+    }
+
+    fn has_body_force(&self) -> bool {
+        (0..self.loads.len()).any(|case| self.body_force(case).is_some())
+    }
 }
 
 /// Times that a solution is begun: conjugate gradients end early when the cycle is not positive.
@@ -35,15 +50,17 @@ const MAX_LEVELS: usize = 7;
 const FEW: usize = 5000;
 const SHARE: usize = 80;
 
-/// Bytes that a solver takes, about: `voxels` that may have stiffness.
-pub fn memory_estimate(voxels: f64, cases: usize) -> f64 {
+/// Bytes that a solver takes, about: `voxels` that may have stiffness; `weighs` when a case has body forces.
+pub fn memory_estimate(voxels: f64, cases: usize, weighs: bool) -> f64 {
     // A node more than voxels each way, and short rows: a tenth more nodes.
     let nodes = 1.1 * voxels + 1e4;
     // Single: b, x, d, t, p, the diagonal, u of every case but one. Double: r, q, u, moduli.
     let starts = 3.0 * cases.saturating_sub(1) as f64;
     let fine = 4.0 * (5.0 * 3.0 + 1.0 + starts) + 8.0 * (3.0 * 3.0 + 1.0);
+    // Shares of elements and of nodes, and a right side with its places.
+    let weight = if weighs { 8.0 * 2.0 + 24.0 * 3.0 } else { 0.0 };
     // Coarse levels: 1/7 of stencil and fields, a quarter more nodes at their borders.
-    nodes * fine + voxels * 1.25 * (243.0 + 18.0) * 4.0 / 7.0
+    nodes * (fine + weight) + voxels * 1.25 * (243.0 + 18.0) * 4.0 / 7.0
 }
 
 /// A multigrid solver for one grid; moduli may change between solutions, supports may not.
@@ -55,6 +72,8 @@ pub struct Solver {
     operator: MatrixFree<f64>,
     multigrid: Multigrid,
     right: Vec<Vec<(usize, f64)>>,
+    /// What body forces act on; none when no case has any.
+    weight: Option<Weight>,
     /// Displacements of the case solved last.
     u: Vec<f64>,
     /// Displacements of the other cases, which start from them: rounded, which is far below the tolerance.
@@ -101,12 +120,16 @@ impl Solver {
             places: (0..cases).map(|case| case.checked_sub(1)).collect(),
             last: 0,
             right,
+            weight: None,
             model,
             frame,
             stiffness,
             options: options.clone(),
         };
         spread(&out.frame.grid, &out.model, moduli, &mut out.e);
+        if out.model.has_body_force() {
+            out.weight = Some(Weight::new(&out.frame.grid, &out.e));
+        }
         out.set_multigrid()?;
         Ok(out)
     }
@@ -126,6 +149,23 @@ impl Solver {
             }
         }
         self.set_multigrid()
+    }
+
+    /// Takes the shares of material, 0 to 1, that body forces act on in `voxels`, as [`Solver::set_moduli`] takes moduli. Others
+    /// keep theirs; at first every voxel with a modulus is full.
+    pub fn set_shares(&mut self, voxels: &[u32], shares: &[f64]) {
+        if let Some(weight) = &mut self.weight {
+            weight.set(&self.frame.grid, self.model.dims, voxels, shares);
+        }
+    }
+
+    /// Forces on nodes and body forces of a case as places and values, some places twice.
+    fn right_side(&self, case: usize) -> Vec<(usize, f64)> {
+        let mut out = self.right[case].clone();
+        if let (Some(weight), Some(force)) = (&self.weight, self.model.body_force(case)) {
+            out.extend(weight.forces(&self.frame, self.model.h, force));
+        }
+        out
     }
 
     fn set_multigrid(&mut self) -> Result<(), FeError> {
@@ -149,6 +189,7 @@ impl Solver {
             self.last = case;
         }
         let (tolerance, most) = (self.options.tolerance, self.options.max_iterations);
+        let right = self.right_side(case);
         let mut stats = SolveStats::default();
         for _ in 0..TRIES {
             let fine = Fine {
@@ -159,7 +200,7 @@ impl Solver {
                 fine,
                 &self.operator,
                 &mut self.multigrid,
-                &self.right[case],
+                &right,
                 &mut self.u,
                 (tolerance, most - stats.iterations),
                 monitor,
@@ -193,8 +234,27 @@ impl Solver {
 
     /// f'u of the case solved last, N mm: twice the strain energy.
     pub fn compliance(&self) -> f64 {
-        let forces = self.right[self.last].iter();
-        forces.map(|&(at, f)| f * self.u[at]).sum()
+        let forces = self.right_side(self.last);
+        forces.iter().map(|&(at, f)| f * self.u[at]).sum()
+    }
+
+    /// Adds `factor` times the work of the body force of the case solved last on a full voxel, N mm, to `out`, which has one
+    /// number for each of `voxels`: places in `[z][y][x]`.
+    pub fn add_body_work(&self, factor: f64, voxels: &[u32], out: &mut [f64]) {
+        let Some(force) = self.model.body_force(self.last) else {
+            return;
+        };
+        let (grid, dims) = (&self.frame.grid, self.model.dims);
+        let factor = factor * self.model.h.powi(3);
+        add_work(grid, dims, &self.u, force.map(|f| factor * f), voxels, out);
+    }
+
+    /// Sum of the body forces on free degrees of freedom in the case solved last, N.
+    pub fn weight(&self) -> [f64; 3] {
+        match (&self.weight, self.model.body_force(self.last)) {
+            (Some(weight), Some(force)) => weight.sum(&self.frame, self.model.h, force),
+            _ => [0.0; 3],
+        }
     }
 
     /// Adds `factor u_e' K0 u_e` of the case solved last, for modulus 1 and edge h, mm3, to `out`, which has one number for
@@ -282,7 +342,8 @@ fn check(model: &VoxelModel, moduli: &[f64], options: &SolverOptions) -> Result<
     let voxels = moduli.iter().filter(|&&e| e > 0.0).count();
     // The moduli of the whole grid count too, with a flag each.
     let all: f64 = dims.iter().map(|&n| n as f64).product();
-    let needed = memory_estimate(voxels as f64, model.loads.len()).max(9.0 * all) / 1e6;
+    let cases = model.loads.len();
+    let needed = memory_estimate(voxels as f64, cases, model.has_body_force()).max(9.0 * all) / 1e6;
     if needed > options.max_memory {
         return Err(FeError::Memory {
             voxels: if voxels > 0 { voxels as f64 } else { all },

@@ -1,5 +1,7 @@
 //! Rows of a field around one row of nodes, written out in full.
 
+use rayon::prelude::*;
+
 use super::grid::{BLOCK, NodeGrid};
 
 /// The nine rows at y-1..=y+1 and z-1..=z+1, with zeros where nothing is stored and `BLOCK` zeros at both ends: operators
@@ -69,4 +71,32 @@ impl<T: Copy + Default> Window<T> {
         let first = (((y + dy) % 3 * 3 + dz) * self.components + c) * self.width;
         &self.rows[first..first + self.width]
     }
+}
+
+/// For every node `value` of the sum of a field of elements over the eight around it.
+pub(super) fn sums_around<T: Send>(
+    grid: &NodeGrid,
+    field: &[f64],
+    out: &mut [T],
+    value: impl Fn(f64) -> T + Sync,
+) {
+    let planes = grid.planes(1, out).enumerate();
+    planes.for_each_init(
+        || Window::<f64>::new(grid, 1),
+        |around, (z, out)| {
+            around.clear();
+            for y in 0..=grid.n[1] {
+                around.load(grid, field, |v| v, y, z);
+                for run in grid.row(y, z) {
+                    for (x, out) in (run.x..).zip(&mut out[run.at..][..run.len]) {
+                        let element = |i: usize| {
+                            let row = around.row(y, 1 - (i >> 1 & 1), 1 - (i >> 2), 0);
+                            row[BLOCK + x - (i & 1)]
+                        };
+                        *out = value((0..8).map(element).sum());
+                    }
+                }
+            }
+        },
+    );
 }

@@ -301,6 +301,7 @@ mod tests {
                 name: "tip".into(),
                 weight: 1.0,
                 forces: vec![([20, 5, 4], [0.3, -1.0, 0.4])],
+                ..LoadCase::default()
             }],
             ..Problem::default()
         };

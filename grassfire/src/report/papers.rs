@@ -221,6 +221,20 @@ pub const ALL: &[Paper] = &[
         used_for: "penalized densities",
     },
     Paper {
+        key: "bruyneel2005",
+        citation: "M. Bruyneel, P. Duysinx (2005): Note on topology optimization of continuum structures including self-weight. Structural and Multidisciplinary Optimization 29.",
+        doi: "10.1007/s00158-004-0484-y",
+        stages: &["optimize"],
+        used_for: "what gravity does to thin material",
+    },
+    Paper {
+        key: "zhu2009",
+        citation: "J. Zhu, W. Zhang, P. Beckers (2009): Integrated layout design of multi-component system. International Journal for Numerical Methods in Engineering 78.",
+        doi: "10.1002/nme.2499",
+        stages: &["optimize"],
+        used_for: "moduli of thin material under gravity",
+    },
+    Paper {
         key: "bruns2001",
         citation: "T. E. Bruns, D. A. Tortorelli (2001): Topology optimization of non-linear elastic structures and compliant mechanisms. Computer Methods in Applied Mechanics and Engineering 190.",
         doi: "10.1016/S0045-7825(00)00278-4",

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 
-use super::element::triangle_shape;
+use super::element::{gauss, gauss_shapes, triangle_shape};
 use super::{TetError, TetLoads, TetMesh, TetModel};
 use crate::Vec3;
 use crate::case::{Case, LoadCaseTable, LoadPlace, Places, forces_on};
@@ -74,7 +74,10 @@ pub(super) fn on_boundary(
         volume: places(0.0, mesh.points.clone())?,
         monitor,
     };
-    let cases = case.case.iter().map(|table| site.loads(table));
+    let cases = case
+        .case
+        .iter()
+        .map(|table| site.loads(table, table.body_force(&case.material)));
     Ok(TetModel {
         cases: cases.collect::<Result<_, _>>()?,
         fixed: site.supports(case)?,
@@ -125,8 +128,8 @@ impl Site<'_> {
         Ok(fixed.into_iter().collect())
     }
 
-    fn loads(&self, table: &LoadCaseTable) -> Result<TetLoads, TetError> {
-        let mut sums: BTreeMap<u32, Vec3> = BTreeMap::new();
+    fn loads(&self, table: &LoadCaseTable, body_force: Vec3) -> Result<TetLoads, TetError> {
+        let mut sums = weight(self.mesh, body_force);
         for load in &table.loads {
             let faces = self.chosen(&load.on)?;
             if faces.is_empty() {
@@ -155,6 +158,24 @@ impl Site<'_> {
             forces: sums.into_iter().collect(),
         })
     }
+}
+
+/// The forces of a body force (N/mm3) on the nodes, N; none without one.
+fn weight(mesh: &TetMesh, force: Vec3) -> BTreeMap<u32, Vec3> {
+    let mut out: BTreeMap<u32, Vec3> = BTreeMap::new();
+    if force == Vec3::zeros() {
+        return out;
+    }
+    let shapes = gauss_shapes();
+    for cell in &mesh.cells {
+        let corners = cell.map(|n| mesh.points[n as usize]);
+        for (point, shape) in gauss(&corners).iter().zip(&shapes) {
+            for (&node, s) in cell.iter().zip(shape) {
+                *out.entry(node).or_default() += s * point.volume * force;
+            }
+        }
+    }
+    out
 }
 
 /// Quadrature points of a curved face.

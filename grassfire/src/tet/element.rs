@@ -26,6 +26,18 @@ pub(super) fn triangle_shape(l: [f64; 3]) -> [f64; 6] {
     ]
 }
 
+/// Shape functions at the Gauss points.
+pub(super) fn gauss_shapes() -> [[f64; 10]; 4] {
+    std::array::from_fn(|g| {
+        let mut l = [FAR; 4];
+        l[g] = NEAR;
+        std::array::from_fn(|i| match i {
+            0..4 => l[i] * (2.0 * l[i] - 1.0),
+            _ => 4.0 * EDGES[i - 4].map(|c| l[c]).iter().product::<f64>(),
+        })
+    })
+}
+
 /// Derivatives of the shape functions by the barycentric coordinates 1, 2, 3 (coordinate 0 is the rest to one).
 fn slopes(l: [f64; 4]) -> [Vec3; 10] {
     // Gradients of the barycentric coordinates themselves.

@@ -213,7 +213,7 @@ impl TetResult {
 ///
 /// 1. A selection holds the faces of the boundary whose six nodes it holds.
 /// 2. A support holds the nodes of its faces and those inside of its selection.
-/// 3. A load acts on its faces by area, consistently: by quadrature and shape functions.
+/// 3. A load acts on its faces by area, gravity on all elements, consistently: by quadrature and shape functions.
 ///
 /// # Errors
 /// [`TetError::NotOnPart`], [`CaseError::Mechanism`], and those of selections.

@@ -373,3 +373,34 @@ fn meshes_of_gmsh_are_read_and_broken_ones_refused() {
         assert!(matches!(error, TetError::Mesh { .. }), "{error}");
     }
 }
+
+/// The displacements of a hanging bar are quadratic, as the elements are.
+#[test]
+fn a_bar_under_its_own_weight_is_exact() {
+    let text = r#"
+units = "mm-N-MPa"
+grid.h = 1.0
+[material]
+young = 70000.0
+nu = 0.0
+density = 7.85e-9
+[design]
+space = [{ box = { min = [0, 0, 0], max = [6, 2, 3] } }]
+[select]
+left = { plane = { point = [0, 0, 0], normal = [1, 0, 0] } }
+[[support]]
+on = "left"
+fix = "xyz"
+[[case]]
+name = "weight"
+gravity = [9.81e6, 0, 0]
+"#;
+    let case = Case::parse("case.toml", text, Path::new(".")).unwrap();
+    let mesh = crooked();
+    let model = model(&case, Path::new("."), &mesh, &Monitor::default()).unwrap();
+    let out = solved(&mesh, &model);
+    let pull = 9.81e6 * 7.85e-9;
+    let exact = pull * pull * 6.0 * 6f64.powi(3) / (6.0 * 70_000.0);
+    assert!((out.strain_energy / exact - 1.0).abs() < 1e-8);
+    assert!(out.cases[0].reaction_error < 1e-8);
+}

@@ -8,6 +8,7 @@ mod filter;
 mod finish;
 mod helmholtz;
 mod hull;
+mod interpolation;
 mod mma;
 mod oc;
 mod options;
@@ -61,6 +62,14 @@ pub enum TopoptError {
         value: f64,
         /// Share of the frozen voxels.
         frozen: f64,
+    },
+    /// Optimality criteria want compliances that fall with material.
+    #[error(
+        "optimize.update is \"oc\", but load case {name:?} has gravity: more material may bend the part more"
+    )]
+    Weight {
+        /// The load case.
+        name: String,
     },
     /// There is nothing to design.
     #[error("the design space holds no voxel to design ({frozen} are frozen, {outside} outside)")]
@@ -129,6 +138,7 @@ impl TopoptError {
             Self::VolumeFraction { frozen, .. } => {
                 Some(format!("give a number between {frozen:.3} and 1"))
             }
+            Self::Weight { .. } => Some("leave optimize.update out: \"mma\" can do it".into()),
             Self::NoDesign { .. } => {
                 Some("check the design space, and that grid.h is finer than its walls".into())
             }

@@ -21,6 +21,8 @@ pub struct LoadCase {
     pub weight: f64,
     /// Forces on nodes, N.
     pub forces: Vec<([usize; 3], [f64; 3])>,
+    /// Force on a volume of full material, N/mm3.
+    pub body_force: [f64; 3],
 }
 
 /// A voxel problem.
@@ -121,6 +123,11 @@ impl Problem {
         self.origin + self.h * Vec3::new(x as f64, y as f64, z as f64)
     }
 
+    /// Whether the mass of the design is a load.
+    pub fn has_body_force(&self) -> bool {
+        self.cases.iter().any(|case| case.body_force != [0.0; 3])
+    }
+
     /// The model of the solver.
     pub fn model(&self) -> VoxelModel {
         VoxelModel {
@@ -129,6 +136,7 @@ impl Problem {
             nu: self.nu,
             fixed: self.fixed.clone(),
             loads: self.cases.iter().map(|case| case.forces.clone()).collect(),
+            body_forces: self.cases.iter().map(|case| case.body_force).collect(),
         }
     }
 }

@@ -6,8 +6,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::finish::{Binary, binary};
+use super::interpolation::Interpolation;
 use super::options::{Objective, OptimizeOptions, UpdateKind};
-use super::problem::{DESIGN, FROZEN};
+use super::problem::{DESIGN, FROZEN, LoadCase};
 use super::smooth::{Smooth, smooth};
 use super::state::State;
 use super::{Chain, Fields, Problem, TopoptError, oc};
@@ -73,8 +74,10 @@ pub struct Optimized {
 /// Makes the structure as stiff as a given volume allows.
 ///
 /// 1. Variables start equal, so that the volume is the bound. A saved state goes on instead.
-/// 2. Each iteration: densities (filter, draw hull, projection), moduli `e_min + rho^p (1 - e_min)`, one solution a load
-///    case, compliance and its gradient, volume and its gradient, new variables by MMA or optimality criteria.
+/// 2. Each iteration: densities (filter, draw hull, projection), moduli `e_min + rho^p (1 - e_min)`, body forces that follow
+///    the densities, one solution a load case, compliance and its gradient, volume and its gradient, new variables by MMA or
+///    optimality criteria. With body forces a sixteenth of the moduli follows the densities themselves, so that thin material
+///    does not weigh more than it carries.
 /// 3. The penalty grows first, then the sharpness of the projection; after that the run ends when densities and compliance
 ///    are quiet five times in a row, at `max_iterations`, or when the user stops it.
 /// 4. The densities are made full or empty with the same volume ([`binary`]).
@@ -92,7 +95,7 @@ pub fn optimize(
     save: &dyn Fn(&State) -> Result<(), TopoptError>,
     monitor: &Monitor,
 ) -> Result<Optimized, TopoptError> {
-    options.check(problem.h)?;
+    check(problem, options)?;
     let mut run = Run::new(problem, options, solver_options, resume, monitor)?;
     run.warn_asymmetry(monitor);
     let mut out = Optimized::default();
@@ -157,10 +160,11 @@ pub fn validate(
     options: &OptimizeOptions,
     solver: &SolverOptions,
 ) -> Result<(), TopoptError> {
-    options.check(problem.h)?;
+    check(problem, options)?;
     target(problem, options)?;
     let voxels = (problem.count(DESIGN) + problem.count(FROZEN)) as f64;
-    let needed = crate::fe::memory_estimate(voxels, problem.cases.len()) / 1e6;
+    let (cases, weighs) = (problem.cases.len(), problem.has_body_force());
+    let needed = crate::fe::memory_estimate(voxels, cases, weighs) / 1e6;
     if needed > solver.max_memory {
         return Err(TopoptError::Fe(FeError::Memory {
             voxels,
@@ -169,6 +173,18 @@ pub fn validate(
         }));
     }
     Chain::new(problem, options).map(drop)
+}
+
+/// Refuses options out of range, and optimality criteria where more material may bend a part more.
+fn check(problem: &Problem, options: &OptimizeOptions) -> Result<(), TopoptError> {
+    options.check(problem.h)?;
+    let weighs = |case: &LoadCase| case.body_force != [0.0; 3];
+    match problem.cases.iter().find(|case| weighs(case)) {
+        Some(case) if options.update == UpdateKind::Oc => Err(TopoptError::Weight {
+            name: case.name.clone(),
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// Full voxels allowed.
@@ -206,6 +222,8 @@ struct Run<'a> {
     fields: Fields,
     /// Strain energy of every design voxel for modulus 1, weighted with the derivative of the objective.
     energy: Vec<f64>,
+    /// Work of the body force on every design voxel if it were full, weighted likewise; empty without body forces.
+    work: Vec<f64>,
     /// Full voxels allowed.
     target: f64,
     /// Design and frozen voxels.
@@ -254,6 +272,11 @@ impl<'a> Run<'a> {
             design: problem.design().map(|v| v as u32).collect(),
             fields: Fields::default(),
             energy: vec![0.0; design as usize],
+            work: if problem.has_body_force() {
+                vec![0.0; design as usize]
+            } else {
+                Vec::new()
+            },
             target,
             active,
             fallbacks: 0,
@@ -324,10 +347,13 @@ impl<'a> Run<'a> {
     fn gradients(&self, penalty: f64) -> (Vec<f64>, Vec<f64>) {
         let eroded = self.chain.eroded(&self.fields);
         let rho = eroded.as_ref().unwrap_or(&self.state.rho);
-        let slope = -penalty * (1.0 - self.options.e_min) * self.problem.young;
+        let law = Interpolation::new(self.problem, self.options.e_min, penalty);
         let g = self.energy.par_iter().zip(rho);
-        let g = g.map(|(energy, rho)| energy * slope * rho.powf(penalty - 1.0));
-        let df = self.chain.gradient(&self.fields, g.collect());
+        let mut g: Vec<f64> = g.map(|(energy, &rho)| -energy * law.slope(rho)).collect();
+        // The work of forces that follow the densities counts twice: f'u changes by f and by u.
+        let works = g.par_iter_mut().zip(&self.work);
+        works.for_each(|(g, work)| *g += 2.0 * work);
+        let df = self.chain.gradient(&self.fields, g);
         (df, self.chain.volume_gradient(&self.fields))
     }
 
@@ -355,19 +381,12 @@ impl<'a> Run<'a> {
     /// Solves all load cases.
     fn respond(&mut self, penalty: f64, monitor: &Monitor) -> Result<Response, TopoptError> {
         let count = self.problem.cases.len();
-        let moduli = |run: &Self, e_min| {
-            let eroded = run.chain.eroded(&run.fields);
-            run.moduli(eroded.as_ref().unwrap_or(&run.state.rho), penalty, e_min)
-        };
-        let first = moduli(self, self.options.e_min);
-        self.solver.set_moduli(&self.design, &first)?;
-        drop(first);
+        self.set_material(penalty, self.options.e_min)?;
         let mut out = Response {
             cases: Vec::new(),
             compliance: 0.0,
             iterations: 0,
         };
-        self.energy.fill(0.0);
         let mut top = 0.0;
         let mut raised = false;
         while out.cases.len() < count {
@@ -387,10 +406,8 @@ impl<'a> Run<'a> {
                     }
                     self.fallbacks += 1;
                     self.solver.restart();
-                    let raised = moduli(self, RAISED_MIN);
-                    self.solver.set_moduli(&self.design, &raised)?;
+                    self.set_material(penalty, RAISED_MIN)?;
                     out.cases.clear();
-                    self.energy.fill(0.0);
                     top = 0.0;
                 }
                 Err(e) => return Err(e.into()),
@@ -402,7 +419,7 @@ impl<'a> Run<'a> {
             Objective::Weighted => weighted.iter().sum(),
             Objective::Worst => {
                 let norm = norm(&weighted);
-                scale(&mut self.energy, (top / norm).powf(NORM - 1.0));
+                self.scale_sums((top / norm).powf(NORM - 1.0));
                 norm
             }
         };
@@ -417,7 +434,7 @@ impl<'a> Run<'a> {
         if self.options.objective == Objective::Worst {
             let weighted = factor * compliance;
             if weighted > *top {
-                scale(&mut self.energy, (*top / weighted).powf(NORM - 1.0));
+                self.scale_sums((*top / weighted).powf(NORM - 1.0));
                 *top = weighted;
             }
             factor *= (weighted / top.max(f64::MIN_POSITIVE)).powf(NORM - 1.0);
@@ -425,11 +442,27 @@ impl<'a> Run<'a> {
         out.cases.push(compliance);
         let solver = &self.solver;
         solver.add_energies(factor, &self.design, &mut self.energy);
+        if !self.work.is_empty() {
+            solver.add_body_work(factor, &self.design, &mut self.work);
+        }
     }
 
-    fn moduli(&self, rho: &[f64], penalty: f64, e_min: f64) -> Vec<f64> {
-        let modulus = |rho: &f64| self.problem.young * (e_min + rho.powf(penalty) * (1.0 - e_min));
-        rho.par_iter().map(modulus).collect()
+    /// Gives the solver the moduli and masses of the densities whose stiffness counts, and begins the sums over the cases anew.
+    fn set_material(&mut self, penalty: f64, e_min: f64) -> Result<(), TopoptError> {
+        let eroded = self.chain.eroded(&self.fields);
+        let rho = eroded.as_ref().unwrap_or(&self.state.rho);
+        let law = Interpolation::new(self.problem, e_min, penalty);
+        self.solver.set_moduli(&self.design, &law.moduli(rho))?;
+        self.solver.set_shares(&self.design, rho);
+        self.energy.fill(0.0);
+        self.work.fill(0.0);
+        Ok(())
+    }
+
+    /// Scales what was summed over the cases so far.
+    fn scale_sums(&mut self, factor: f64) {
+        scale(&mut self.energy, factor);
+        scale(&mut self.work, factor);
     }
 }
 

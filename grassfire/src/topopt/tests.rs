@@ -1,5 +1,6 @@
 //! Gradients against finite differences, hulls, symmetry, and the reference cantilever.
 
+use super::interpolation::Interpolation;
 use super::*;
 use crate::Vec3;
 use crate::fe::{Solver, SolverOptions};
@@ -28,6 +29,7 @@ fn cantilever(n: usize) -> Problem {
         forces: (0..=dims[2])
             .map(|z| ([n, 0, z], [0.0, -share, 0.0]))
             .collect(),
+        ..LoadCase::default()
     });
     problem
 }
@@ -91,6 +93,7 @@ fn small() -> Problem {
         name: "side".into(),
         weight: 0.5,
         forces: vec![([12, 1, 3], [0.0, 0.3, 1.0])],
+        ..LoadCase::default()
     });
     problem
 }
@@ -106,11 +109,11 @@ fn evaluate(
     let mut fields = Fields::default();
     chain.forward(x, Some(4.0), &mut fields);
     let (rho, eroded) = (chain.densities(&fields), chain.eroded(&fields));
-    let e = |rho: f64| 1e-6 + rho.powi(3) * (1.0 - 1e-6);
+    let law = Interpolation::new(problem, 1e-6, 3.0);
     let stiff = eroded.as_ref().unwrap_or(&rho);
-    let moduli: Vec<f64> = stiff.iter().map(|&rho| e(rho)).collect();
     let design: Vec<u32> = problem.design().map(|v| v as u32).collect();
-    solver.set_moduli(&design, &moduli).unwrap();
+    solver.set_moduli(&design, &law.moduli(stiff)).unwrap();
+    solver.set_shares(&design, stiff);
     let mut g = vec![0.0; x.len()];
     let mut c = 0.0;
     for (k, case) in problem.cases.iter().enumerate() {
@@ -119,8 +122,9 @@ fn evaluate(
         let mut energies = vec![0.0; x.len()];
         solver.add_energies(1.0, &design, &mut energies);
         for (i, energy) in energies.into_iter().enumerate() {
-            g[i] -= case.weight * 3.0 * stiff[i].powi(2) * (1.0 - 1e-6) * energy;
+            g[i] -= case.weight * law.slope(stiff[i]) * energy;
         }
+        solver.add_body_work(2.0 * case.weight, &design, &mut g);
     }
     let volume = rho.iter().sum();
     (
@@ -133,9 +137,11 @@ fn evaluate(
 
 #[test]
 fn gradients_agree_with_finite_differences() {
-    let problem = small();
-    let present: Vec<f64> = (0..problem.labels.len())
-        .map(|v| f64::from(u8::from(problem.is_active(v))))
+    let still = small();
+    let mut heavy = small();
+    heavy.cases[0].body_force = [0.002, -0.01, 0.005];
+    let present: Vec<f64> = (0..still.labels.len())
+        .map(|v| f64::from(u8::from(still.is_active(v))))
         .collect();
     let solver_options = SolverOptions {
         tolerance: 1e-12,
@@ -148,14 +154,15 @@ fn gradients_agree_with_finite_differences() {
             at: 3.0,
         })
     };
-    for (draw, filter, robust) in [
-        (None, FilterKind::Cone, 0.0),
-        (None, FilterKind::Cone, 0.2),
-        (None, FilterKind::Helmholtz, 0.0),
-        (draw(Parting::Plane), FilterKind::Cone, 0.0),
-        (draw(Parting::Plane), FilterKind::Cone, 0.2),
-        (draw(Parting::OneSided), FilterKind::Cone, 0.0),
-        (draw(Parting::Free), FilterKind::Cone, 0.0),
+    for (problem, draw, filter, robust) in [
+        (&still, None, FilterKind::Cone, 0.0),
+        (&still, None, FilterKind::Cone, 0.2),
+        (&still, None, FilterKind::Helmholtz, 0.0),
+        (&still, draw(Parting::Plane), FilterKind::Cone, 0.0),
+        (&still, draw(Parting::Plane), FilterKind::Cone, 0.2),
+        (&still, draw(Parting::OneSided), FilterKind::Cone, 0.0),
+        (&still, draw(Parting::Free), FilterKind::Cone, 0.0),
+        (&heavy, None, FilterKind::Cone, 0.2),
     ] {
         let options = OptimizeOptions {
             draw,
@@ -164,19 +171,19 @@ fn gradients_agree_with_finite_differences() {
             filter_radius: Some(1.8),
             ..OptimizeOptions::default()
         };
-        let chain = Chain::new(&problem, &options).unwrap();
+        let chain = Chain::new(problem, &options).unwrap();
         let mut solver = Solver::new(problem.model(), &present, &solver_options).unwrap();
         let x: Vec<f64> = problem
             .design()
             .map(|v| 0.2 + 0.5 * ((v * 7919 + 13) % 1009) as f64 / 1009.0)
             .collect();
-        let (_, df, _, dv) = evaluate(&problem, &chain, &x, &mut solver);
+        let (_, df, _, dv) = evaluate(problem, &chain, &x, &mut solver);
         let largest = df.iter().fold(0.0f64, |m, g| m.max(g.abs()));
         for v in (5..x.len()).step_by(61) {
             let mut at = |delta: f64| {
                 let mut x = x.clone();
                 x[v] += delta;
-                let (c, _, volume, _) = evaluate(&problem, &chain, &x, &mut solver);
+                let (c, _, volume, _) = evaluate(problem, &chain, &x, &mut solver);
                 (c, volume)
             };
             // Small against the smoothing of the hull.
@@ -192,6 +199,55 @@ fn gradients_agree_with_finite_differences() {
             assert!((fd - dv[v]).abs() < 1e-6, "{options:?} {v}: {fd} {}", dv[v]);
         }
     }
+}
+
+#[test]
+fn an_arch_carries_a_deck_and_its_own_weight() {
+    // A frozen deck above two held feet; nothing but weight acts.
+    let dims = [24, 3, 12];
+    let mut problem = Problem {
+        h: 1.0,
+        dims,
+        labels: vec![DESIGN; dims.iter().product()],
+        young: 1.0,
+        nu: 0.3,
+        ..Problem::default()
+    };
+    for (x, y) in (8..16).flat_map(|x| [(x, 0), (x, 1), (x, 2)]) {
+        let v = problem.index([x, y, 11]);
+        problem.labels[v] = FROZEN;
+    }
+    for (x, y) in (0..=3).flat_map(|y| [(0, y), (24, y)]) {
+        problem.fixed.extend((0..3).map(|c| ([x, y, 0], c)));
+    }
+    problem.cases.push(LoadCase {
+        name: "weight".into(),
+        weight: 1.0,
+        body_force: [0.0, 0.0, -1e-3],
+        ..LoadCase::default()
+    });
+    let mut options = OptimizeOptions {
+        volume_fraction: 0.5,
+        max_iterations: 80,
+        ..OptimizeOptions::default()
+    };
+    let out = run(&problem, &options);
+    let last = out.history.last().unwrap();
+    assert!(last.compliance < out.history[0].compliance, "{last:?}");
+    assert!(
+        last.grayness < 0.2 && last.volume_fraction < 0.501,
+        "{last:?}"
+    );
+    // The middle of the floor would only weigh; the deck hangs together with both feet.
+    assert!(out.rho[problem.index([12, 1, 0])] < 0.1);
+    let full: Vec<bool> = out.rho.iter().map(|rho| *rho > 0.5).collect();
+    let (labels, _) = crate::fe::components(dims, &full);
+    let [deck, left, right] =
+        [[12, 1, 11], [0, 1, 0], [23, 1, 0]].map(|at| labels[problem.index(at)]);
+    assert!(deck != u32::MAX && deck == left && deck == right);
+    options.update = UpdateKind::Oc;
+    let refused = validate(&problem, &options, &SolverOptions::default());
+    assert!(matches!(refused, Err(TopoptError::Weight { .. })));
 }
 
 #[test]

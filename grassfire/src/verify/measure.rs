@@ -132,6 +132,11 @@ pub(super) fn solve(
         nu: case.material.nu,
         fixed: conditions.fixed,
         loads: conditions.loads,
+        body_forces: case
+            .case
+            .iter()
+            .map(|table| table.body_force(&case.material).into())
+            .collect(),
     };
     let problem = grid.problem();
     let mut solver = Solver::new(model, &moduli, options)?;
@@ -139,6 +144,10 @@ pub(super) fn solve(
     let voxels: Vec<usize> = (0..grid.values.len())
         .filter(|&v| grid.values[v] > 0.0)
         .collect();
+    let shares: Vec<f64> = voxels.iter().map(|&v| grid.values[v]).collect();
+    let places: Vec<u32> = voxels.iter().map(|&v| v as u32).collect();
+    solver.set_shares(&places, &shares);
+    drop((shares, places));
     let trusted = trusted(&problem, &grid, &solver.model().fixed);
     let mut out = GridResult {
         elements: voxels.len(),
@@ -189,19 +198,20 @@ fn trusted(problem: &Problem, grid: &Fractions, fixed: &[([usize; 3], usize)]) -
 
 /// How far the reactions are from balancing the loads, relative to the loads. Forces on fixed nodes never enter the solver.
 fn reaction_error(solver: &Solver, case: usize) -> f64 {
-    let mut sum = solver.reactions();
+    let length = |v: &[f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let (mut sum, weight) = (solver.reactions(), solver.weight());
     let model = solver.model();
-    let mut size = 0.0;
+    let mut size = length(&weight);
+    sum.iter_mut().zip(weight).for_each(|(s, w)| *s += w);
     for (node, force) in &model.loads[case] {
-        size += force.iter().map(|f| f * f).sum::<f64>().sqrt();
+        size += length(force);
         for c in 0..3 {
             if model.fixed.binary_search(&(*node, c)).is_err() {
                 sum[c] += force[c];
             }
         }
     }
-    let off = sum.iter().map(|s| s * s).sum::<f64>().sqrt();
-    if size > 0.0 { off / size } else { 0.0 }
+    if size > 0.0 { length(&sum) / size } else { 0.0 }
 }
 
 /// Displacements of all nodes and the largest one.

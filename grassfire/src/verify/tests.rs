@@ -175,6 +175,31 @@ fn cantilever_with_shear_is_right_to_one_percent() {
     assert!(ratio < 0.97 && ratio > 0.85, "{ratio}");
 }
 
+/// A bar that hangs on its left face under its own weight: `E u' = rho g (L - x)`.
+#[test]
+fn a_bar_under_its_own_weight_is_as_long_as_it_should_be() {
+    let mut case = box_case([12.0, 4.0, 4.0], 0.0, [1.0, 0.0, 0.0]);
+    case.case[0].loads.clear();
+    case.case[0].gravity = Some([9.81e6, 0.0, 0.0]);
+    case.material.density = Some(7.85e-9);
+    case.check().unwrap();
+    let mesh = shapes::cuboid(Vec3::zeros(), Vec3::new(12.0, 4.0, 4.0));
+    let pull = 9.81e6 * 7.85e-9;
+    let exact = pull * pull * 16.0 * 12f64.powi(3) / (6.0 * 70_000.0);
+    let longer = pull * 144.0 / (2.0 * 70_000.0);
+    // Whole voxels, and cut ones of which a third carries and weighs.
+    for (h, near) in [(1.0, 6e-3), (1.5, 2e-2)] {
+        case.verify.h = Some(h);
+        let out = verify(&case, Path::new("."), &mesh, None, &Monitor::default()).unwrap();
+        let ratio = out.fine.strain_energy / exact;
+        assert!((ratio - 1.0).abs() < near, "{h}: {ratio}");
+        let ratio = out.fine.u_max() / longer;
+        assert!((ratio - 1.0).abs() < near, "{h}: {ratio}");
+        let error = out.fine.reaction_error();
+        assert!(error < 1e-5, "{h}: {error}");
+    }
+}
+
 /// A bar with a neck, thinned until the neck tears: the bar itself is proved all the same.
 #[test]
 fn a_part_that_tears_at_equal_volume_is_proved_without_that() {
