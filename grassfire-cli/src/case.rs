@@ -195,8 +195,9 @@ fn describe(case: &Case, built: &Built) -> String {
         );
     }
     text += &format!(
-        "supports    {} fixed directions of nodes\n",
-        problem.fixed.len()
+        "supports    {} fixed directions of nodes, {} nodes on springs\n",
+        problem.fixed.len(),
+        problem.springs.len()
     );
     for load_case in &problem.cases {
         let sum = [0, 1, 2].map(|c| load_case.forces.iter().map(|(_, f)| f[c]).sum::<f64>());

@@ -61,7 +61,7 @@ fn products() {
         nu: 0.3,
         fixed: (0..3).map(|c| ([0, 0, 0], c)).collect(),
         loads: vec![vec![([n, n, n], [1.0, 0.0, 0.0])]],
-        body_forces: Vec::new(),
+        ..VoxelModel::default()
     };
     let voxels = n * n * n;
     let solver =

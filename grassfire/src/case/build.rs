@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use nalgebra::Matrix3;
+
 use super::loads::{LoadPlace, exposed, forces_on};
 use super::select::Nodes;
 use super::shape::{Solid, any};
@@ -145,9 +147,10 @@ pub fn build(case: &Case, folder: &Path, monitor: &Monitor) -> Result<Built, Cas
         ..Built::default()
     };
     let nodes = nodes(case, &problem, folder, &owned);
-    let (fixed, cases) = conditions(&nodes, &problem, &mut built.selections, monitor)?;
-    problem.fixed = fixed;
-    problem.cases = cases;
+    let conditions = conditions(&nodes, &problem, &mut built.selections, monitor)?;
+    problem.fixed = conditions.fixed;
+    problem.springs = conditions.springs;
+    problem.cases = conditions.cases;
     hold(&mut problem, monitor)?;
     built.problem = problem;
     Ok(built)
@@ -163,7 +166,7 @@ pub(crate) fn conditions_on(
     problem: &Problem,
     folder: &Path,
     monitor: &Monitor,
-) -> Result<(Fixed, Vec<LoadCase>), CaseError> {
+) -> Result<Conditions, CaseError> {
     let centres: Vec<Vec3> = (0..problem.labels.len())
         .map(|v| problem.centre(v))
         .collect();
@@ -248,20 +251,32 @@ fn nodes<'a>(
     }
 }
 
-pub(crate) type Fixed = Vec<([usize; 3], usize)>;
-
 /// Supports and load cases on nodes.
+#[derive(Debug, Default)]
+pub(crate) struct Conditions {
+    /// Node and component, ascending.
+    pub fixed: Vec<([usize; 3], usize)>,
+    /// Nodes that springs hold, N/mm.
+    pub springs: Vec<([usize; 3], Matrix3<f64>)>,
+    pub cases: Vec<LoadCase>,
+}
+
 fn conditions(
     nodes: &Nodes,
     problem: &Problem,
     infos: &mut Vec<SelectionInfo>,
     monitor: &Monitor,
-) -> Result<(Fixed, Vec<LoadCase>), CaseError> {
-    let mut fixed = Vec::new();
+) -> Result<Conditions, CaseError> {
+    let (mut fixed, mut springs) = (Vec::new(), Vec::new());
     for support in &nodes.case.support {
         let found = resolve(nodes, &support.on, "support", infos, monitor)?;
-        for axis in support.fix.chars().filter_map(|c| "xyz".find(c)) {
+        for axis in support.fixed() {
             fixed.extend(found.iter().map(|&i| (problem.at_node(i), axis)));
+        }
+        let count = found.len() as f64;
+        if let Some(stiffness) = support.stiffness(count * problem.young * problem.h) {
+            let share = stiffness / count;
+            springs.extend(found.iter().map(|&i| (problem.at_node(i), share)));
         }
     }
     fixed.sort_unstable();
@@ -281,7 +296,11 @@ fn conditions(
             body_force: table.body_force(&nodes.case.material).into(),
         });
     }
-    Ok((fixed, cases))
+    Ok(Conditions {
+        fixed,
+        springs,
+        cases,
+    })
 }
 
 /// The nodes of a selection that touch material; those of non-design bodies where there are any.
@@ -389,17 +408,22 @@ fn hold(problem: &mut Problem, monitor: &Monitor) -> Result<(), CaseError> {
         out
     };
     let mut fixed = vec![Vec::new(); pieces.len()];
+    let mut springs = vec![Vec::new(); pieces.len()];
     for dof in &problem.fixed {
         of_node(&dof.0)
             .into_iter()
             .for_each(|p| fixed[p as usize].push(*dof));
     }
+    for spring in &problem.springs {
+        of_node(&spring.0)
+            .into_iter()
+            .for_each(|p| springs[p as usize].push(*spring));
+    }
+    let is_held = |p: usize| !fixed[p].is_empty() || !springs[p].is_empty();
     for case in &problem.cases {
         for (node, _) in &case.forces {
-            let held = of_node(node)
-                .into_iter()
-                .any(|p| !fixed[p as usize].is_empty());
-            if held || problem.fixed.is_empty() {
+            let held = of_node(node).into_iter().any(|p| is_held(p as usize));
+            if held || problem.fixed.is_empty() && problem.springs.is_empty() {
                 continue;
             }
             return Err(CaseError::LooseLoad {
@@ -412,19 +436,19 @@ fn hold(problem: &mut Problem, monitor: &Monitor) -> Result<(), CaseError> {
         }
     }
     let mut loose = 0;
-    for (piece, fixed) in pieces.iter().zip(&fixed) {
-        if fixed.is_empty() && pieces.len() > 1 {
+    for (p, piece) in pieces.iter().enumerate() {
+        if !is_held(p) && pieces.len() > 1 {
             loose += piece.size;
             continue;
         }
-        let modes = free_modes(fixed);
+        let modes = free_modes(&fixed[p], &springs[p]);
         if !modes.is_empty() {
             return Err(CaseError::Mechanism { modes });
         }
     }
     if loose > 0 {
         for (v, &label) in labels.iter().enumerate() {
-            if label != u32::MAX && fixed[label as usize].is_empty() {
+            if label != u32::MAX && !is_held(label as usize) {
                 problem.labels[v] = OUTSIDE;
             }
         }

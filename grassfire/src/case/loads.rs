@@ -30,7 +30,7 @@ impl LoadPlace {
 
 /// The forces of a load on points, N; the kinds of a load add up.
 ///
-/// 1. `force`: shares by weight.
+/// 1. `force`: shares by weight; what it turns when it acts `at` another point than their centre comes on top of the moment.
 /// 2. `moment`: the smallest forces that make it.
 /// 3. `pressure`: against the outward normals, by area.
 /// 4. `bearing`: a pressure that falls with the cosine of the angle to the force, on the half of the surface that faces it, as a
@@ -42,8 +42,12 @@ impl LoadPlace {
 pub(crate) fn forces_on(places: &[LoadPlace], load: &Load) -> Result<Vec<Vec3>, CaseError> {
     let mut out = vec![Vec3::zeros(); places.len()];
     add_evenly(places, Vec3::from(load.force.unwrap_or_default()), &mut out);
-    if let Some(moment) = load.moment.filter(|m| *m != [0.0; 3]) {
-        add_moment(places, load, Vec3::from(moment), &mut out)?;
+    let mut moment = Vec3::from(load.moment.unwrap_or_default());
+    if let (Some(at), Some(force)) = (load.at, load.force) {
+        moment += (Vec3::from(at) - centre(places)).cross(&Vec3::from(force));
+    }
+    if moment != Vec3::zeros() {
+        add_moment(places, load, moment, &mut out)?;
     }
     if let Some(pressure) = load.pressure {
         if places.iter().all(|p| p.area == Vec3::zeros()) {
@@ -65,6 +69,11 @@ fn no_surface(places: &[LoadPlace], load: &Load) -> CaseError {
     }
 }
 
+fn centre(places: &[LoadPlace]) -> Vec3 {
+    let total: f64 = places.iter().map(|p| p.weight).sum();
+    places.iter().map(|p| p.place * p.weight).sum::<Vec3>() / total
+}
+
 fn add_evenly(places: &[LoadPlace], force: Vec3, out: &mut [Vec3]) {
     let total: f64 = places.iter().map(|p| p.weight).sum();
     let shares = out.iter_mut().zip(places);
@@ -77,8 +86,7 @@ fn add_moment(
     moment: Vec3,
     out: &mut [Vec3],
 ) -> Result<(), CaseError> {
-    let total: f64 = places.iter().map(|p| p.weight).sum();
-    let centre = places.iter().map(|p| p.place * p.weight).sum::<Vec3>() / total;
+    let centre = centre(places);
     let inertia: Matrix3<f64> = places
         .iter()
         .map(|p| (p.place - centre, p.weight))

@@ -10,6 +10,7 @@ mod materials;
 mod places;
 mod select;
 mod shape;
+mod supports;
 
 #[cfg(test)]
 mod tests;
@@ -29,6 +30,7 @@ pub use materials::LIBRARY;
 pub(crate) use places::Places;
 pub use select::Selector;
 pub use shape::Shape;
+pub use supports::{Spring, Support};
 
 use crate::Vec3;
 use crate::fe::SolverOptions;
@@ -140,16 +142,6 @@ pub struct KeepOut {
     pub core: bool,
 }
 
-/// A support.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Support {
-    /// Selection.
-    pub on: String,
-    /// Fixed directions: some of `x`, `y`, `z`, such as `xyz`.
-    pub fix: String,
-}
-
 /// A load case.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -194,6 +186,9 @@ pub struct Load {
     pub force: Option<[f64; 3]>,
     /// Moment about the centre of the selection, N mm.
     pub moment: Option<[f64; 3]>,
+    /// The point that `force` acts in, mm, joined to the selection as by a lever that stiffens nothing. Default: the middle of the
+    /// selection.
+    pub at: Option<[f64; 3]>,
     /// Pressure on the surface, MPa. In the optimization it stays on the faces of the design space and the bodies.
     pub pressure: Option<f64>,
     /// Total force, N, that a pin presses with on the wall of a bore: with the cosine, on the half that faces it.
@@ -272,15 +267,7 @@ impl Case {
         }
         for (i, support) in self.support.iter().enumerate() {
             self.find(&support.on, &format!("support[{i}].on"))?;
-            let fix = &support.fix;
-            if fix.is_empty() || !fix.chars().all(|c| "xyz".contains(c)) {
-                let key = format!("support[{i}].fix");
-                return Err(value(
-                    &key,
-                    format!("{fix:?}"),
-                    "some of x, y, z, such as \"xyz\"",
-                ));
-            }
+            support.check(&format!("support[{i}]"))?;
         }
         self.check_shapes()
     }
@@ -318,6 +305,10 @@ impl Case {
             }
             let none = |v: Option<[f64; 3]>| v.is_none_or(|v| v == [0.0; 3]);
             finite(&key("pressure"), &load.pressure)?;
+            finite(&key("at"), load.at.iter().flatten())?;
+            if load.at.is_some() && load.force.is_none() {
+                return Err(value(&key("at"), "given", "a force that acts there"));
+            }
             let vectors = [load.force, load.moment, load.bearing];
             if vectors.into_iter().all(none) && load.pressure.is_none_or(|p| p == 0.0) {
                 let wanted = "a force, a moment, a pressure or a bearing force";

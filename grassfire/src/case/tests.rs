@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use nalgebra::Matrix3;
+
 use super::*;
 use crate::Vec3;
 use crate::fe::FeError;
@@ -109,12 +111,65 @@ fn bad_cases_are_refused_by_name() {
         "{ file = { path = \"nothing.stl\" } }, { box = ",
     );
     assert!(matches!(e, CaseError::MissingFile { .. }), "{e}");
+    let e = broken("fix = \"xyz\"", "fix = \"xyz\"\nroller = [1, 0, 0]");
+    assert!(
+        e.to_string().contains("one of fix, roller and spring"),
+        "{e}"
+    );
+    let e = broken("fix = \"xyz\"", "spring = { stiffness = 0 }");
+    assert!(e.to_string().contains("N/mm"), "{e}");
+    let e = broken(
+        "fix = \"xyz\"",
+        "spring = { stiffness = 9, along = [1, 0, 0] }",
+    );
+    assert!(
+        matches!(&e, CaseError::Mechanism { modes } if modes.len() >= 3),
+        "{e}"
+    );
     let e = broken("nu = 0.3", "nu = 0.3\ndensity = 7850.0");
     assert!(e.to_string().contains("t/mm3"), "{e}");
     let e = broken("[optimize]", "gravity = [0, 0, -9810]\n[optimize]");
     assert!(e.to_string().contains("material.density"), "{e}");
     let e = broken("{ on = \"ring\", force", "{ on = \"corner\", moment");
     assert!(matches!(e, CaseError::Moment { .. }), "{e}");
+}
+
+#[test]
+fn a_force_at_a_remote_point_turns_the_part_too() {
+    let at = "on = \"ring\", at = [16, 5, 45], force = [100, 0, 0]";
+    let built = try_build(&GOOD.replace("on = \"ring\", force = [100, 0, 0]", at)).unwrap();
+    let p = &built.problem;
+    let (mut force, mut moment) = (Vec3::zeros(), Vec3::zeros());
+    for (node, f) in &p.cases[0].forces {
+        let f = Vec3::from(*f);
+        force += f;
+        moment += (p.node(*node) - Vec3::new(16.0, 5.0, 45.0)).cross(&f);
+    }
+    assert!((force - Vec3::new(100.0, 0.0, 0.0)).norm() < 1e-9);
+    assert!(moment.norm() < 1e-9, "{moment}");
+}
+
+#[test]
+fn a_roller_holds_its_normal_and_a_spring_what_it_is_told() {
+    let built = |support: &str| {
+        let fixed = "[[support]]\non = \"left\"\nfix = \"xyz\"\n[[support]]\non = \"left\"\n";
+        let text = GOOD.replace(
+            "[[support]]\non = \"left\"\nfix = \"xyz\"",
+            &format!("{fixed}{support}"),
+        );
+        try_build(&text).unwrap().problem
+    };
+    let along = built("roller = [-3, 0, 0]");
+    assert_eq!((along.fixed.len(), along.springs.len()), (3 * 36, 0));
+    let slanting = built("roller = [1, 1, 0]");
+    assert_eq!(slanting.springs.len(), 36);
+    let sum: Matrix3<f64> = slanting.springs.iter().map(|(_, k)| k).sum();
+    // A hundred times E h for every node.
+    assert!((sum.trace() / (100.0 * 1000.0 * 2.0 * 36.0) - 1.0).abs() < 1e-9);
+    assert!((sum[(0, 1)] / sum[(0, 0)] - 1.0).abs() < 1e-9 && sum[(2, 2)] == 0.0);
+    let soft = built("spring = { stiffness = 90, along = [0, 0, 2] }");
+    let sum: Matrix3<f64> = soft.springs.iter().map(|(_, k)| k).sum();
+    assert!((sum[(2, 2)] - 90.0).abs() < 1e-9 && (sum.trace() - 90.0).abs() < 1e-9);
 }
 
 #[test]

@@ -64,15 +64,19 @@ impl Coarse {
         let size = self.unknowns.len();
         let mut triplets = Vec::with_capacity(elements.len() * 300 + size);
         for (at, k) in elements {
-            let dofs: [usize; 24] = std::array::from_fn(|i| {
+            // A spring on the border of an element may have corners of it that no material touches; it does nothing there.
+            let dofs: [Option<usize>; 24] = std::array::from_fn(|i| {
                 let [x, y, z] = corner(*at, i / 3);
                 let node = (z * (grid.n[1] + 1) + y) * (grid.n[0] + 1) + x;
-                self.numbers[node] as usize + i % 3
+                let number = self.numbers[node];
+                (number != u32::MAX).then_some(number as usize + i % 3)
             });
-            for i in 0..24 {
-                for j in 0..24 {
-                    if dofs[i] >= dofs[j] {
-                        triplets.push(Triplet::new(dofs[i], dofs[j], k[i][j]));
+            for (i, row) in dofs.iter().enumerate() {
+                for (j, column) in dofs.iter().enumerate() {
+                    if let (Some(row), Some(column)) = (row, column)
+                        && row >= column
+                    {
+                        triplets.push(Triplet::new(*row, *column, k[i][j]));
                     }
                 }
             }

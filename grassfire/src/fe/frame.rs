@@ -1,14 +1,19 @@
-//! What all operators of one problem share: the finest grid and its fixed degrees of freedom.
+//! What all operators of one problem share: the finest grid, its fixed degrees of freedom and its springs.
 
 use std::collections::HashMap;
 
-use super::grid::NodeGrid;
+use nalgebra::Matrix3;
 
-/// The finest grid and its fixed degrees of freedom.
+use super::grid::NodeGrid;
+use super::springs::{SpringNode, spring_nodes};
+
+/// The finest grid and what holds it.
 pub(super) struct Frame {
     pub grid: NodeGrid,
-    /// Places in a node field, ascending.
+    /// Fixed degrees of freedom: places in a node field, ascending.
     pub fixed: Vec<usize>,
+    /// Nodes that springs hold.
+    pub springs: Vec<SpringNode>,
     /// By number of the element `[z][y][x]`: bit `3 corner + component` is set where fixed.
     masks: HashMap<usize, u32>,
     /// The elements of `masks`, ascending.
@@ -17,8 +22,12 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// `fixed`: (node, component) pairs; doubles are allowed.
-    pub fn new(grid: NodeGrid, fixed: &[([usize; 3], usize)]) -> Self {
+    /// `fixed`: (node, component) pairs, `springs`: nodes with stiffness, N/mm; doubles are allowed.
+    pub fn new(
+        grid: NodeGrid,
+        fixed: &[([usize; 3], usize)],
+        springs: &[([usize; 3], Matrix3<f64>)],
+    ) -> Self {
         let n = grid.n;
         let mut places: Vec<usize> = fixed
             .iter()
@@ -45,6 +54,7 @@ impl Frame {
         }
         masked.sort_unstable();
         Self {
+            springs: spring_nodes(&grid, &places, springs),
             grid,
             fixed: places,
             masks,

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::frame::Frame;
 use super::grid::{BLOCK, NodeGrid};
 use super::matrix_free::Float;
+use super::springs::on_coarse;
 use super::stencil::{STRIDE, Stencil};
 
 /// Length of a table: the upper triangle of 24x24, padded.
@@ -233,6 +234,20 @@ pub(super) fn fill(
         };
         Arch::new().dispatch(|| slab.fill(frame, tables, e, values));
     });
+    for (at, matrix) in on_coarse(&frame.springs, tables.level, grid.n) {
+        for a in 0..8 {
+            for j in 0..8 {
+                let block = |r: usize, c: usize| matrix[3 * a + r][3 * j + c] as f32;
+                stencil.add(grid, corner(at, a), neighbour(a, j), block);
+            }
+        }
+    }
+}
+
+/// Number of corner `j` of an element among the 27 nodes around corner `a`.
+fn neighbour(a: usize, j: usize) -> usize {
+    let step = |d: usize| (j >> d & 1) + 1 - (a >> d & 1);
+    (step(2) * 3 + step(1)) * 3 + step(0)
 }
 
 /// Some planes of nodes of a stencil.
@@ -283,8 +298,7 @@ impl Slab<'_> {
             let block = self.blocks[z] - self.blocks[self.first] + place / BLOCK;
             let values = &mut values[block * STRIDE + place % BLOCK..];
             for j in 0..8 {
-                let step = |d: usize| (j >> d & 1) + 1 - (a >> d & 1);
-                let neighbour = (step(2) * 3 + step(1)) * 3 + step(0);
+                let neighbour = neighbour(a, j);
                 for r in 0..3 {
                     for c in 0..3 {
                         let to = (neighbour * 9 + r * 3 + c) * BLOCK;
@@ -301,7 +315,7 @@ pub(super) fn corner(at: [usize; 3], a: usize) -> [usize; 3] {
     [at[0] + (a & 1), at[1] + (a >> 1 & 1), at[2] + (a >> 2)]
 }
 
-/// The full matrices of all coarse elements with stiffness, for a direct solver.
+/// The full matrices of all coarse elements with stiffness and of the springs, for a direct solver.
 pub(super) fn elements(
     frame: &Frame,
     grid: &NodeGrid,
@@ -324,5 +338,7 @@ pub(super) fn elements(
         out
     };
     let rows: Vec<Vec<_>> = (0..n[1] * n[2]).into_par_iter().map(row).collect();
-    rows.concat()
+    let mut out = rows.concat();
+    out.extend(on_coarse(&frame.springs, tables.level, n));
+    out
 }

@@ -20,6 +20,7 @@ mod pcg;
 mod rows;
 mod smoother;
 mod solver;
+mod springs;
 mod stencil;
 mod stress;
 mod transfer;

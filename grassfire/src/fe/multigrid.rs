@@ -1,5 +1,6 @@
 //! The preconditioner: one geometric multigrid cycle in single precision.
 
+use nalgebra::Matrix3;
 use rayon::prelude::*;
 
 use super::coarse::Coarse;
@@ -8,6 +9,7 @@ use super::galerkin::{self, Tables};
 use super::grid::{NodeGrid, dot};
 use super::matrix_free::{MatrixFree, hold};
 use super::smoother::{self, Diagonal, Vectors};
+use super::springs::add_forces;
 use super::stencil::Stencil;
 use super::window::sums_around;
 use super::{FeError, SolverOptions, element, transfer};
@@ -104,8 +106,9 @@ impl Multigrid {
         self.coarse.factor(&self.coarsest, &elements)?;
         for level in &mut self.levels {
             match (&mut level.operator, &mut level.diagonal) {
-                (Operator::Fine(_), Diagonal::Node(inverse)) => {
+                (Operator::Fine(_), Diagonal::Node { inverse, blocks }) => {
                     node_diagonal(&level.grid, e, self.unit.0, inverse);
+                    *blocks = spring_blocks(frame, inverse);
                 }
                 (Operator::Coarse(stencil, tables), Diagonal::Component(inverse)) => {
                     galerkin::fill(frame, &level.grid, tables, e, stencil);
@@ -192,7 +195,11 @@ impl Level {
     fn new(grid: NodeGrid, l: usize, stiffness: &[[f64; 24]; 24], frame: &Frame) -> Self {
         let (operator, diagonal, probe) = if l == 0 {
             let operator = Operator::Fine(MatrixFree::new(stiffness));
-            (operator, Diagonal::Node(grid.scalar()), Vec::new())
+            let diagonal = Diagonal::Node {
+                inverse: grid.scalar(),
+                blocks: Vec::new(),
+            };
+            (operator, diagonal, Vec::new())
         } else {
             let tables = Tables::new(stiffness, l, frame);
             let operator = Operator::Coarse(Stencil::new(&grid), tables);
@@ -214,7 +221,10 @@ impl Level {
     /// `t = K x`.
     fn apply_x(&mut self, Fine { frame, e }: Fine) {
         match &self.operator {
-            Operator::Fine(op) => op.apply(&self.grid, e, &frame.fixed, &self.x, &mut self.t),
+            Operator::Fine(op) => {
+                op.apply(&self.grid, e, &frame.fixed, &self.x, &mut self.t);
+                add_forces(&frame.springs, &self.x, &mut self.t);
+            }
             Operator::Coarse(stencil, _) => stencil.apply(&self.grid, &self.x, &mut self.t),
         }
     }
@@ -303,6 +313,25 @@ fn node_diagonal(grid: &NodeGrid, e: &[f64], k: f64, inverse: &mut [f32]) {
         }
     };
     sums_around(grid, e, inverse, of_sum);
+}
+
+/// The inverse diagonal blocks of the nodes that springs hold: they take the place of the numbers there, which become zero.
+fn spring_blocks(frame: &Frame, inverse: &mut [f32]) -> Vec<([usize; 3], Matrix3<f32>)> {
+    let mut out = Vec::new();
+    for spring in &frame.springs {
+        let z = spring.at[2];
+        let Some(place) = frame.grid.place(spring.at) else {
+            continue;
+        };
+        let of_elements = &mut inverse[frame.grid.first(z) + place];
+        if *of_elements > 0.0 {
+            let block = spring.stiffness + Matrix3::identity() / f64::from(*of_elements);
+            *of_elements = 0.0;
+            let inverse = block.try_inverse().unwrap_or_else(Matrix3::zeros);
+            out.push((spring.places, inverse.cast()));
+        }
+    }
+    out
 }
 
 /// Inverse diagonal of a stencil.

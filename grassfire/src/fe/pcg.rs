@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::grid::{PIECE, dot};
 use super::matrix_free::MatrixFree;
 use super::multigrid::{Fine, Multigrid};
+use super::springs::add_forces;
 use crate::monitor::{Cancelled, Monitor};
 
 /// How a solution went.
@@ -33,10 +34,11 @@ pub(super) fn solve(
     monitor: &Monitor,
 ) -> Result<SolveStats, Cancelled> {
     let grid = &fine.frame.grid;
-    let fixed = &fine.frame.fixed;
+    let (fixed, springs) = (&fine.frame.fixed, &fine.frame.springs);
     let (mut r, mut p, mut q) = (grid.field(), grid.field::<f32>(), grid.field());
     let size = b.iter().map(|(_, v)| v * v).sum::<f64>().sqrt();
     operator.apply(grid, fine.e, fixed, &*u, &mut q);
+    add_forces(springs, &*u, &mut q);
     r.par_iter_mut()
         .zip(&q)
         .for_each(|(r, q): (&mut f64, &f64)| *r = -q);
@@ -64,6 +66,7 @@ pub(super) fn solve(
                     .for_each(|(p, &z)| *p = (f64::from(z) + beta * f64::from(*p)) as f32)
             });
         operator.apply(grid, fine.e, fixed, &p, &mut q);
+        add_forces(springs, &p, &mut q);
         let alpha = rz / dot(&p, &q);
         u.par_chunks_mut(PIECE)
             .zip(p.par_chunks(PIECE))

@@ -3,6 +3,7 @@
 //! M. Adams, M. Brezina, J. Hu, R. Tuminaro: Parallel multigrid smoothing: polynomial versus Gauss-Seidel, 2003,
 //! doi:10.1016/S0021-9991(03)00194-3.
 
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::grid::NodeGrid;
@@ -22,10 +23,15 @@ pub(super) fn coefficients(degree: usize, high: f64, ratio: f64) -> Vec<(f32, f3
     out
 }
 
-/// The inverse diagonal: one value a node where its three entries are equal, else one a degree of freedom.
+/// The inverse diagonal: one value a node where its three entries are equal, else one a degree of freedom, or a block.
 pub(super) enum Diagonal {
-    /// A scalar field.
-    Node(Vec<f32>),
+    /// One value a node, a scalar field.
+    Node {
+        /// Zero at the nodes of `blocks`.
+        inverse: Vec<f32>,
+        /// Nodes that have a block instead: places and inverse.
+        blocks: Vec<([usize; 3], Matrix3<f32>)>,
+    },
     /// A node field.
     Component(Vec<f32>),
 }
@@ -60,7 +66,7 @@ pub(super) fn step<B: Copy + Into<f64> + Sync>(
                 );
                 let b = &b[at..at + count];
                 let inverse = match diagonal {
-                    Diagonal::Node(all) => &all[first..first + count],
+                    Diagonal::Node { inverse, .. } => &inverse[first..first + count],
                     Diagonal::Component(all) => &all[at..at + count],
                 };
                 if zero {
@@ -79,4 +85,15 @@ pub(super) fn step<B: Copy + Into<f64> + Sync>(
                 }
             }
         });
+    let Diagonal::Node { blocks, .. } = diagonal else {
+        return;
+    };
+    for (places, inverse) in blocks {
+        let rest = places.map(|at| b[at].into() as f32 - if zero { 0.0 } else { v.t[at] });
+        let step = c2 * inverse * Vector3::from(rest);
+        for (&at, step) in places.iter().zip(step.iter()) {
+            v.d[at] += step;
+            v.x[at] += step;
+        }
+    }
 }

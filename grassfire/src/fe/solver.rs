@@ -1,5 +1,6 @@
 //! The solver of one voxel model: set the moduli, solve the load cases.
 
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::energy::add_energies;
@@ -8,6 +9,7 @@ use super::grid::NodeGrid;
 use super::matrix_free::MatrixFree;
 use super::multigrid::{Fine, Multigrid, POWER_AGAIN};
 use super::pcg::{self, SolveStats};
+use super::springs::SpringNode;
 use super::weight::{Weight, add_work};
 use super::{FeError, SolverOptions, element, galerkin};
 use crate::monitor::Monitor;
@@ -23,6 +25,8 @@ pub struct VoxelModel {
     pub nu: f64,
     /// Fixed degrees of freedom: node and component.
     pub fixed: Vec<([usize; 3], usize)>,
+    /// Springs between nodes and the ground, N/mm; symmetric.
+    pub springs: Vec<([usize; 3], Matrix3<f64>)>,
     /// For every load case the forces on nodes, N.
     pub loads: Vec<Vec<([usize; 3], [f64; 3])>>,
     /// For every load case the force on a volume of full material, N/mm3; may be empty when there is none.
@@ -106,7 +110,7 @@ impl Solver {
         let occupied = padded(model.dims, side, moduli);
         let grid = NodeGrid::new(model.dims.map(|n| n.next_multiple_of(side)), &occupied);
         let stiffness = element::stiffness(model.nu);
-        let frame = Frame::new(grid, &model.fixed);
+        let frame = Frame::new(grid, &model.fixed, &model.springs);
         let right = (0..model.loads.len())
             .map(|case| sparse(&frame, &model, moduli, case))
             .collect::<Result<Vec<_>, _>>()?;
@@ -232,7 +236,7 @@ impl Solver {
         self.starts.iter_mut().for_each(|u| u.fill(0.0));
     }
 
-    /// f'u of the case solved last, N mm: twice the strain energy.
+    /// f'u of the case solved last, N mm: twice the energy in the part and in its springs.
     pub fn compliance(&self) -> f64 {
         let forces = self.right_side(self.last);
         forces.iter().map(|&(at, f)| f * self.u[at]).sum()
@@ -271,7 +275,16 @@ impl Solver {
         [0, 1, 2].map(u)
     }
 
-    /// Sum of the reactions at the supports in the case solved last, N.
+    /// Energy in the springs in the case solved last, N mm.
+    pub fn spring_energy(&self) -> f64 {
+        let energy = |spring: &SpringNode| {
+            let u = Vector3::from(spring.places.map(|at| self.u[at]));
+            u.dot(&(spring.stiffness * u)) / 2.0
+        };
+        self.frame.springs.iter().map(energy).sum()
+    }
+
+    /// Sum of the reactions at the supports, springs among them, in the case solved last, N.
     pub fn reactions(&self) -> [f64; 3] {
         let grid = &self.frame.grid;
         let mut product = grid.field();
@@ -285,6 +298,11 @@ impl Solver {
             if let Some(at) = grid.node(node, c) {
                 sum[c] += product[at];
             }
+        }
+        for spring in &self.frame.springs {
+            let u = Vector3::from(spring.places.map(|at| self.u[at]));
+            let force = spring.stiffness * u;
+            (0..3).for_each(|c| sum[c] -= force[c]);
         }
         sum
     }

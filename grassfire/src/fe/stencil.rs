@@ -50,6 +50,23 @@ impl Stencil {
             });
     }
 
+    /// Adds a block to the coupling of a node to a neighbour (0 to 26); nothing where the node is not stored.
+    pub fn add(
+        &mut self,
+        grid: &NodeGrid,
+        node: [usize; 3],
+        neighbour: usize,
+        block: impl Fn(usize, usize) -> f32,
+    ) {
+        let Some(place) = grid.place(node) else {
+            return;
+        };
+        let first = (self.blocks[node[2]] + place / BLOCK) * STRIDE + place % BLOCK;
+        for (r, c) in (0..9).map(|i| (i / 3, i % 3)) {
+            self.values[first + (neighbour * 9 + r * 3 + c) * BLOCK] += block(r, c);
+        }
+    }
+
     /// The diagonal entry of component `c` of the node at `place` in plane `z`.
     pub fn diagonal(&self, z: usize, place: usize, c: usize) -> f32 {
         let block = self.blocks[z] + place / BLOCK;

@@ -1,5 +1,7 @@
 //! Exact solutions and invariants of the voxel solver.
 
+use nalgebra::{Matrix3, Vector3};
+
 use super::*;
 use crate::monitor::Monitor;
 
@@ -219,7 +221,7 @@ fn contrast_does_not_matter() {
 #[test]
 fn supports_that_leave_a_motion_free_are_named() {
     let at = |x, y, z, c| ([x, y, z], c);
-    assert_eq!(free_modes(&[]), RIGID_MODES);
+    assert_eq!(free_modes(&[], &[]), RIGID_MODES);
     let hinge = [
         at(0, 0, 0, 0),
         at(0, 0, 0, 1),
@@ -228,10 +230,10 @@ fn supports_that_leave_a_motion_free_are_named() {
         at(0, 0, 9, 1),
         at(0, 0, 9, 2),
     ];
-    assert_eq!(free_modes(&hinge), ["rotation about z"]);
+    assert_eq!(free_modes(&hinge, &[]), ["rotation about z"]);
     let mut held = hinge.to_vec();
     held.push(at(5, 0, 0, 1));
-    assert_eq!(free_modes(&held), Vec::<&str>::new());
+    assert_eq!(free_modes(&held, &[]), Vec::<&str>::new());
 }
 
 #[test]
@@ -257,4 +259,69 @@ fn pieces_share_faces() {
     let (labels, pieces) = components([3; 3], &solid);
     assert_eq!(pieces.len(), 2);
     assert_eq!((pieces[0].size, pieces[1].size, labels[13]), (2, 1, 1));
+}
+
+/// A bar of 40 x 8 x 8 voxels that springs hold at its left face, `stiffness` on each of its 81 nodes, pulled at the other.
+fn sprung(stiffness: impl Fn([usize; 3]) -> Matrix3<f64>, pull: [f64; 3]) -> VoxelModel {
+    let mut model = VoxelModel {
+        dims: [40, 8, 8],
+        h: 0.5,
+        nu: 0.0,
+        loads: vec![Vec::new()],
+        ..VoxelModel::default()
+    };
+    for (y, z) in (0..81).map(|i| (i % 9, i / 9)) {
+        let half = |i: usize| if i == 0 || i == 8 { 0.5 } else { 1.0 };
+        let share = half(y) * half(z) / 64.0;
+        model.loads[0].push(([40, y, z], pull.map(|f| f * share)));
+        let at = [0, y, z];
+        model.springs.push((at, share * stiffness(at)));
+    }
+    model
+}
+
+#[test]
+fn a_bar_on_springs_moves_by_their_give_and_its_own() {
+    // 20 mm long, 16 mm2, E = 1: it gives way by 20 / 16, the springs by 1 / 0.05.
+    let model = sprung(|_| Matrix3::identity() * 0.05, [1.0, 0.0, 0.0]);
+    assert!(free_modes(&model.fixed, &model.springs).is_empty());
+    let options = SolverOptions {
+        tolerance: 1e-10,
+        coarsest: 600,
+        ..SolverOptions::default()
+    };
+    let mut solver = Solver::new(model, &[1.0; 40 * 64], &options).unwrap();
+    let stats = solver.solve(0, &Monitor::default()).unwrap();
+    assert!(stats.iterations <= 30, "{stats:?}");
+    let u = solver.displacement([40, 3, 5]);
+    assert!((u[0] - 21.25).abs() < 1e-6 && u[1].abs() < 1e-6, "{u:?}");
+    assert!((solver.spring_energy() - 10.0).abs() < 1e-6);
+    assert!((solver.compliance() - 21.25).abs() < 1e-6);
+    let reactions = solver.reactions();
+    assert!((reactions[0] + 1.0).abs() < 1e-6, "{reactions:?}");
+}
+
+#[test]
+fn stiff_springs_along_a_slanting_normal_do_not_slow_the_solver_down() {
+    // The left face slides on a slanting plane; one of its nodes is fixed across.
+    let n = Vector3::new(2.0, 1.0, -0.5).normalize();
+    let mut model = sprung(|_| 1e4 * n * n.transpose(), [0.3, -1.0, 0.2]);
+    let slides = free_modes(&model.fixed, &model.springs);
+    assert_eq!(slides.len(), 3, "{slides:?}");
+    model.fixed = vec![([0, 4, 4], 1), ([0, 4, 4], 2), ([0, 8, 4], 2)];
+    assert!(free_modes(&model.fixed, &model.springs).is_empty());
+    let options = SolverOptions {
+        tolerance: 1e-8,
+        coarsest: 600,
+        ..SolverOptions::default()
+    };
+    let mut solver = Solver::new(model, &[1.0; 40 * 64], &options).unwrap();
+    let stats = solver.solve(0, &Monitor::default()).unwrap();
+    println!("{stats:?}");
+    assert!(stats.iterations <= 40, "{stats:?}");
+    for (y, z) in (0..81).map(|i| (i % 9, i / 9)) {
+        let u = Vector3::from(solver.displacement([0, y, z]));
+        let end = Vector3::from(solver.displacement([40, y, z]));
+        assert!(u.dot(&n).abs() < 0.02 * end.norm(), "{u} {end}");
+    }
 }

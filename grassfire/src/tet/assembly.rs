@@ -44,6 +44,9 @@ pub(super) fn assemble(
             system.add_coarse(&mesh.cells[cell], &coarse);
         }
     }
+    for (node, stiffness) in &model.springs {
+        system.add_spring(*node as usize, stiffness, fixed);
+    }
     for (dof, _) in fixed.iter().enumerate().filter(|(_, held)| **held) {
         let at = system.find(dof / 3, (dof / 3) as u32);
         system.blocks[at][(dof % 3, dof % 3)] = 1.0;
@@ -153,15 +156,41 @@ impl System {
         }
     }
 
-    fn add_coarse(&mut self, nodes: &[u32; 10], k: &Coarse) {
-        let dof = |a: usize, d: usize| 3 * self.corners[nodes[a] as usize] + d as u32;
-        for (i, d) in (0..12).map(|n| (n / 3, n % 3)) {
-            for (j, e) in (0..12).map(|n| (n / 3, n % 3)) {
-                let (row, column) = (dof(i, d), dof(j, e));
-                if row >= column {
-                    self.coarse.push((row, column, k[i][j][(d, e)]));
-                }
+    /// Adds a spring between a node and the ground.
+    fn add_spring(&mut self, node: usize, stiffness: &Matrix3<f64>, fixed: &[bool]) {
+        let mut k = *stiffness;
+        for d in (0..3).filter(|d| fixed[3 * node + d]) {
+            k.row_mut(d).fill(0.0);
+            k.column_mut(d).fill(0.0);
+        }
+        let at = self.find(node, node as u32);
+        self.blocks[at] += k;
+        // The linear functions of its corners, as for elements.
+        let corners: Vec<(usize, f64)> = match self.corners[node] {
+            u32::MAX => self.parents[node].map(|c| (c as usize, 0.5)).into(),
+            _ => vec![(node, 1.0)],
+        };
+        for &(a, wa) in &corners {
+            for &(b, wb) in &corners {
+                self.add_coarse_block(a, b, &(wa * wb * k));
             }
+        }
+    }
+
+    /// Adds the lower entries of a block that couples two corners.
+    fn add_coarse_block(&mut self, a: usize, b: usize, block: &Matrix3<f64>) {
+        let dof = |node: usize, d: usize| 3 * self.corners[node] + d as u32;
+        for (d, e) in (0..9).map(|i| (i / 3, i % 3)) {
+            let (row, column) = (dof(a, d), dof(b, e));
+            if row >= column {
+                self.coarse.push((row, column, block[(d, e)]));
+            }
+        }
+    }
+
+    fn add_coarse(&mut self, nodes: &[u32; 10], k: &Coarse) {
+        for (i, j) in (0..16).map(|n| (n / 4, n % 4)) {
+            self.add_coarse_block(nodes[i] as usize, nodes[j] as usize, &k[i][j]);
         }
     }
 

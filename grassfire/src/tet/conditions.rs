@@ -3,10 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 
+use nalgebra::Matrix3;
+
 use super::element::{gauss, gauss_shapes, triangle_shape};
 use super::{TetError, TetLoads, TetMesh, TetModel};
 use crate::Vec3;
-use crate::case::{Case, LoadCaseTable, LoadPlace, Places, forces_on};
+use crate::case::{Case, LoadCaseTable, LoadPlace, Places, Support, forces_on};
 use crate::monitor::Monitor;
 
 /// Tolerances of selections, as a share of the mean edge on the boundary: its nodes lie on the exact surface.
@@ -81,6 +83,7 @@ pub(super) fn on_boundary(
     Ok(TetModel {
         cases: cases.collect::<Result<_, _>>()?,
         fixed: site.supports(case)?,
+        springs: site.springs(case, mean)?,
         young: case.material.young,
         nu: case.material.nu,
     })
@@ -111,7 +114,8 @@ impl Site<'_> {
 
     fn supports(&self, case: &Case) -> Result<Vec<(u32, usize)>, TetError> {
         let mut fixed = BTreeSet::new();
-        for support in &case.support {
+        let fixing = |s: &&Support| !s.fixed().is_empty();
+        for support in case.support.iter().filter(fixing) {
             let faces = self.chosen(&support.on)?;
             let within = self.volume.select(&support.on, self.monitor)?;
             let inside = within.into_iter().map(|i| i as u32);
@@ -122,26 +126,52 @@ impl Site<'_> {
                     name: support.on.clone(),
                 });
             }
-            let axes = support.fix.chars().filter_map(|c| "xyz".find(c));
+            let axes = support.fixed().into_iter();
             fixed.extend(axes.flat_map(|axis| nodes.iter().map(move |&n| (n, axis))));
         }
         Ok(fixed.into_iter().collect())
     }
 
+    /// Springs at the nodes of faces, each with the share that its shape function has in the area: those at the corners of flat
+    /// faces come to zero. `edge`: mean edge of the boundary, mm.
+    fn springs(&self, case: &Case, edge: f64) -> Result<Vec<(u32, Matrix3<f64>)>, TetError> {
+        let mut sums: BTreeMap<u32, Matrix3<f64>> = BTreeMap::new();
+        for support in &case.support {
+            if support.stiffness(1.0).is_none() {
+                continue;
+            }
+            let points = self.points(&support.on, "support")?;
+            let area: f64 = points.iter().map(|p| p.area.norm()).sum();
+            let beneath = case.material.young * area / edge;
+            let stiffness = support.stiffness(beneath).unwrap_or_default() / area;
+            for point in points {
+                for (&node, shape) in point.face.iter().zip(point.shape) {
+                    *sums.entry(node).or_default() += shape * point.area.norm() * stiffness;
+                }
+            }
+        }
+        Ok(sums.into_iter().collect())
+    }
+
+    /// Quadrature points of the faces of a selection.
+    fn points(&self, name: &str, what: &'static str) -> Result<Vec<Point>, TetError> {
+        let faces = self.chosen(name)?;
+        if faces.is_empty() {
+            return Err(TetError::NotOnPart {
+                what,
+                name: name.to_owned(),
+            });
+        }
+        Ok(faces
+            .iter()
+            .flat_map(|f| quadrature(self.mesh, f))
+            .collect())
+    }
+
     fn loads(&self, table: &LoadCaseTable, body_force: Vec3) -> Result<TetLoads, TetError> {
         let mut sums = weight(self.mesh, body_force);
         for load in &table.loads {
-            let faces = self.chosen(&load.on)?;
-            if faces.is_empty() {
-                return Err(TetError::NotOnPart {
-                    what: "load",
-                    name: load.on.clone(),
-                });
-            }
-            let points: Vec<Point> = faces
-                .iter()
-                .flat_map(|f| quadrature(self.mesh, f))
-                .collect();
+            let points = self.points(&load.on, "load")?;
             let places: Vec<LoadPlace> = points
                 .iter()
                 .map(|p| LoadPlace::on_surface(p.place, p.area))

@@ -1,5 +1,7 @@
 //! CalculiX: decks, runs, and what they say.
 
+use std::io::Write;
+use std::ops::Range;
 use std::path::Path;
 
 use super::gmsh::find;
@@ -9,6 +11,10 @@ use crate::monitor::Monitor;
 
 /// Digits of a number: CalculiX reads twenty characters.
 const DIGITS: usize = 12;
+/// Length of a spring, mm: CalculiX turns the springs of a step by the displacements of the last one.
+const FAR: f64 = 1e5;
+/// Stiffness across a spring, as a share of that along it.
+const ROUNDING: f64 = 1e-12;
 /// From so many nodes on its direct solver takes minutes and gigabytes.
 const DIRECT: usize = 50_000;
 
@@ -61,9 +67,14 @@ pub fn write_deck(
             "*MATERIAL, NAME=PART\n*ELASTIC\n{:e}, {}",
             model.young, model.nu
         )?;
-        writeln!(out, "*SOLID SECTION, ELSET=EALL, MATERIAL=PART\n*BOUNDARY")?;
+        writeln!(out, "*SOLID SECTION, ELSET=EALL, MATERIAL=PART")?;
+        let grounds = write_springs(out, mesh, model)?;
+        writeln!(out, "*BOUNDARY")?;
         for (node, axis) in &model.fixed {
             writeln!(out, "{}, {}, {}", node + 1, axis + 1, axis + 1)?;
+        }
+        for ground in grounds {
+            writeln!(out, "{ground}, 1, 3")?;
         }
         model.cases.iter().try_for_each(|case| {
             writeln!(out, "** {}", case.name.replace(['\n', '\r'], " "))?;
@@ -77,6 +88,41 @@ pub fn write_deck(
             writeln!(out, "*NODE FILE\nU\n*EL FILE\nS\n*END STEP")
         })
     })
+}
+
+/// Writes a spring to a node of its own for every direction in which a node is held by springs; returns those nodes' numbers.
+fn write_springs(
+    out: &mut dyn Write,
+    mesh: &TetMesh,
+    model: &TetModel,
+) -> std::io::Result<Range<usize>> {
+    let first = mesh.points.len() + 1;
+    let (mut ground, mut element) = (first, mesh.cells.len() + 1);
+    for (node, stiffness) in &model.springs {
+        let eigen = stiffness.symmetric_eigen();
+        let most = eigen.eigenvalues.amax();
+        for (k, direction) in eigen
+            .eigenvalues
+            .iter()
+            .zip(eigen.eigenvectors.column_iter())
+        {
+            if *k <= ROUNDING * most {
+                continue;
+            }
+            let p = mesh.points[*node as usize] + FAR * direction;
+            let [x, y, z]: [f64; 3] = p.into();
+            writeln!(
+                out,
+                "*NODE\n{ground}, {x:.DIGITS$e}, {y:.DIGITS$e}, {z:.DIGITS$e}"
+            )?;
+            writeln!(out, "*ELEMENT, TYPE=SPRINGA, ELSET=SPRING{element}")?;
+            writeln!(out, "{element}, {}, {ground}", node + 1)?;
+            writeln!(out, "*SPRING, ELSET=SPRING{element}\n\n{k:.DIGITS$e}")?;
+            ground += 1;
+            element += 1;
+        }
+    }
+    Ok(first..ground)
 }
 
 /// Runs CalculiX on a deck of `cases` load cases and reads the energies.

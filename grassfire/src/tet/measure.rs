@@ -16,7 +16,7 @@ pub struct TetCase {
     pub name: String,
     /// Strain energy: the sum over the elements, N mm.
     pub strain_energy: f64,
-    /// Half of the work of the loads, N mm: equal to the strain energy but for the residual.
+    /// Half of the work of the loads without the energy in springs, N mm: equal to the strain energy but for the residual.
     pub half_work: f64,
     /// Largest displacement, mm.
     pub u_max: f64,
@@ -75,7 +75,10 @@ pub(super) fn case(mesh: &TetMesh, model: &TetModel, loads: &TetLoads, found: So
     }
     let internal = elements(mesh, model, u, &mut out);
     out.strain_energy = internal.iter().zip(u).map(|(f, u)| f.dot(u)).sum::<f64>() / 2.0;
-    out.reaction_error = reaction_error(model, loads, &internal);
+    out.reaction_error = reaction_error(model, loads, &internal, u);
+    let spring =
+        |(node, k): &(u32, Matrix3<f64>)| u[*node as usize].dot(&(k * u[*node as usize])) / 2.0;
+    out.half_work -= model.springs.iter().map(spring).sum::<f64>();
     out.displacement = found.displacement;
     out
 }
@@ -127,8 +130,9 @@ fn elements(mesh: &TetMesh, model: &TetModel, u: &[Vec3], out: &mut TetCase) -> 
 }
 
 /// How far the reactions are from balancing the loads, relative to the loads.
-fn reaction_error(model: &TetModel, loads: &TetLoads, internal: &[Vec3]) -> f64 {
-    let mut sum = Vec3::zeros();
+fn reaction_error(model: &TetModel, loads: &TetLoads, internal: &[Vec3], u: &[Vec3]) -> f64 {
+    let springs = model.springs.iter();
+    let mut sum = -springs.map(|(n, k)| k * u[*n as usize]).sum::<Vec3>();
     for &(node, axis) in &model.fixed {
         sum[axis] += internal[node as usize][axis];
     }

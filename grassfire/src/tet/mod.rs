@@ -18,6 +18,7 @@ mod tests;
 
 use std::path::Path;
 
+use nalgebra::Matrix3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +29,7 @@ pub use measure::TetCase;
 
 use crate::Vec3;
 use crate::case::{Case, CaseError};
+use crate::fe::free_modes_of;
 use crate::monitor::Monitor;
 
 /// Name of this stage in progress and warnings.
@@ -168,6 +170,8 @@ pub(crate) const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3
 pub struct TetModel {
     /// Held degrees of freedom (node, component), ascending.
     pub fixed: Vec<(u32, usize)>,
+    /// Nodes that springs hold (node, N/mm), ascending.
+    pub springs: Vec<(u32, Matrix3<f64>)>,
     /// For every load case its name, weight and forces on nodes (node, N), ascending.
     pub cases: Vec<TetLoads>,
     /// Young's modulus, MPa.
@@ -212,7 +216,7 @@ impl TetResult {
 /// The model of a project file on a mesh; `folder` is where the paths of the project begin.
 ///
 /// 1. A selection holds the faces of the boundary whose six nodes it holds.
-/// 2. A support holds the nodes of its faces and those inside of its selection.
+/// 2. A support holds the nodes of its faces and those inside of its selection; springs are spread over the faces.
 /// 3. A load acts on its faces by area, gravity on all elements, consistently: by quadrature and shape functions.
 ///
 /// # Errors
@@ -224,8 +228,10 @@ pub fn model(
     monitor: &Monitor,
 ) -> Result<TetModel, TetError> {
     let model = conditions::on_boundary(case, folder, mesh, monitor)?;
-    let held = |&(node, axis): &(u32, usize)| (mesh.points[node as usize].into(), axis);
-    let modes = crate::fe::free_modes_of(&model.fixed.iter().map(held).collect::<Vec<_>>());
+    let place = |node: u32| mesh.points[node as usize].into();
+    let fixed = model.fixed.iter().map(|&(node, axis)| (place(node), axis));
+    let springs = model.springs.iter().map(|&(node, k)| (place(node), k));
+    let modes = free_modes_of(&fixed.collect::<Vec<_>>(), &springs.collect::<Vec<_>>());
     if modes.is_empty() {
         Ok(model)
     } else {

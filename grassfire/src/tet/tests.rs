@@ -87,6 +87,7 @@ fn loaded(
     let name = "one".to_owned();
     TetModel {
         fixed,
+        springs: Vec::new(),
         cases: vec![TetLoads {
             name,
             weight: 1.0,
@@ -251,13 +252,14 @@ fn nafems_le10_thick_plate_is_right_to_two_percent() {
 /// The project's supports and loads reach the mesh, and CalculiX finds the same energy on it.
 #[test]
 fn calculix_finds_the_same_energy() {
-    let text = r#"
+    let good = r#"
 units = "mm-N-MPa"
 [grid]
 h = 1.0
 [material]
 young = 70000.0
 nu = 0.3
+density = 2.7e-9
 [design]
 space = [{ box = { min = [0, 0, 0], max = [6, 2, 3] } }]
 [select]
@@ -271,19 +273,34 @@ name = "end"
 loads = [{ on = "right", force = [10.0, 20.0, -100.0] }]
 [[case]]
 name = "twist"
+gravity = [0, 9e8, 0]
 loads = [{ on = "right", moment = [300.0, 0.0, 0.0] }]
 [optimize]
 volume_fraction = 0.5
 "#;
-    let case = Case::parse("case.toml", text, Path::new(".")).expect("a case");
-    let mesh = crooked();
-    let model = model(&case, Path::new("."), &mesh, &Monitor::default()).expect("a model");
-    let sum: Vec3 = model.cases[0].forces.iter().map(|(_, f)| f).sum();
-    assert!((sum - Vec3::new(10.0, 20.0, -100.0)).norm() < 1e-9, "{sum}");
-    let out = solved(&mesh, &model);
+    let slanting = "spring = { stiffness = 9000 }\n[[support]]\non = \"left\"\nroller = [3, 1, -1]";
+    for support in ["fix = \"xyz\"", slanting] {
+        let text = good.replace("fix = \"xyz\"", support);
+        let case = Case::parse("case.toml", &text, Path::new(".")).expect("a case");
+        let mesh = crooked();
+        let model = model(&case, Path::new("."), &mesh, &Monitor::default()).expect("a model");
+        let sum: Vec3 = model.cases[0].forces.iter().map(|(_, f)| f).sum();
+        assert!((sum - Vec3::new(10.0, 20.0, -100.0)).norm() < 1e-9, "{sum}");
+        let sum: Vec3 = model.cases[1].forces.iter().map(|(_, f)| f).sum();
+        assert!((sum.y / (2.7e-9 * 36.0 * 9e8) - 1.0).abs() < 1e-9, "{sum}");
+        let out = solved(&mesh, &model);
+        for case in &out.cases {
+            assert!((case.half_work / case.strain_energy - 1.0).abs() < 1e-7);
+            assert!(case.reaction_error < 1e-7, "{}", case.reaction_error);
+        }
+        compare_with_calculix(&mesh, &model, &out);
+    }
+}
+
+fn compare_with_calculix(mesh: &TetMesh, model: &TetModel, out: &TetResult) {
     let folder = tempfile::tempdir().expect("a folder");
     let deck = folder.path().join("part.inp");
-    write_deck(&deck, &mesh, &model, "box").expect("a deck");
+    write_deck(&deck, mesh, model, "box").expect("a deck");
     let options = TetOptions::default();
     if Command::new(&options.ccx).arg("-v").output().is_err() {
         println!("skipped: no ccx (Debian: apt-get install calculix-ccx)");

@@ -1,5 +1,7 @@
 //! What is optimized: voxels with labels, supports and load cases.
 
+use nalgebra::Matrix3;
+
 use crate::Vec3;
 use crate::fe::VoxelModel;
 
@@ -42,6 +44,8 @@ pub struct Problem {
     pub nu: f64,
     /// Fixed degrees of freedom: node and component.
     pub fixed: Vec<([usize; 3], usize)>,
+    /// Springs between nodes and the ground, N/mm.
+    pub springs: Vec<([usize; 3], Matrix3<f64>)>,
     /// Load cases.
     pub cases: Vec<LoadCase>,
 }
@@ -104,6 +108,7 @@ impl Problem {
             dims,
             labels: Vec::new(),
             fixed: Vec::new(),
+            springs: Vec::new(),
             cases: Vec::new(),
             ..*self
         };
@@ -135,6 +140,7 @@ impl Problem {
             h: self.h,
             nu: self.nu,
             fixed: self.fixed.clone(),
+            springs: self.springs.clone(),
             loads: self.cases.iter().map(|case| case.forces.clone()).collect(),
             body_forces: self.cases.iter().map(|case| case.body_force).collect(),
         }

@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use nalgebra::Matrix3;
+
 use super::{Fractions, STAGE, VerifyError};
 use crate::Vec3;
-use crate::case::{Case, LoadCaseTable, LoadPlace, Places, forces_on};
+use crate::case::{Case, LoadCaseTable, LoadPlace, Places, Support, forces_on};
 use crate::fe::components;
 use crate::mesh::{Bvh, TriMesh};
 use crate::monitor::Monitor;
@@ -27,9 +29,14 @@ const ROUNDING: f64 = 1e-9;
 pub(super) struct Conditions {
     /// Node and component.
     pub fixed: Vec<([usize; 3], usize)>,
+    /// Nodes that springs hold, N/mm.
+    pub springs: Springs,
     /// For every load case the forces on nodes, N.
     pub loads: Vec<Forces>,
 }
+
+/// Stiffness of springs at nodes, N/mm.
+type Springs = Vec<([usize; 3], Matrix3<f64>)>;
 
 /// Forces on nodes, N.
 type Forces = Vec<([usize; 3], [f64; 3])>;
@@ -119,7 +126,7 @@ impl Pieces {
 ///
 /// 1. The surface is cut into pieces no longer than a third of a voxel; selections hold pieces.
 /// 2. A support holds the nodes within half a voxel of its pieces, on both sides, so that the held region ends at the
-///    surface on average; and those inside of its selection.
+///    surface on average; and those inside of its selection. Springs are spread over the pieces as a load is.
 /// 3. Material that no support holds is taken out of `grid` with a warning.
 /// 4. A load acts on its pieces by area; the force on a point of a piece goes to the corners of its voxel by trilinear weights.
 /// 5. Where a selection meets no surface, the nodes take its place with a warning.
@@ -144,9 +151,13 @@ pub(super) fn on_surface(
     };
     let mut active = ActiveNodes::new(grid);
     let mut fixed = site.supports(grid, &active)?;
-    if drop_loose(grid, &fixed, monitor) {
+    let mut springs = site.springs(grid, &active)?;
+    let held = fixed.iter().map(|(node, _)| *node);
+    let held: Vec<[usize; 3]> = held.chain(springs.iter().map(|(node, _)| *node)).collect();
+    if drop_loose(grid, &held, monitor) {
         active = ActiveNodes::new(grid);
         fixed.retain(|(node, _)| active.contains(*node));
+        springs.retain(|(node, _)| active.contains(*node));
     }
     let loads = case
         .case
@@ -155,6 +166,7 @@ pub(super) fn on_surface(
     Ok(Conditions {
         loads: loads.collect::<Result<_, _>>()?,
         fixed,
+        springs,
     })
 }
 
@@ -188,20 +200,70 @@ impl Site<'_> {
         let places = node_places(grid, active);
         let within = Places::new(self.case, self.folder, places.clone(), 0.0, self.monitor)?;
         let mut fixed = Vec::new();
-        for support in &self.case.support {
+        let fixing = |s: &&Support| !s.fixed().is_empty();
+        for support in self.case.support.iter().filter(fixing) {
             let mut held = within.select(&support.on, self.monitor)?;
             let chosen = self.chosen(&support.on)?;
             held.extend(near(self.pieces, &chosen, &places, grid.h / 2.0));
             if held.is_empty() {
                 held = self.nodes_instead(&support.on, "support", &places, grid.h)?;
             }
-            for axis in support.fix.chars().filter_map(|c| "xyz".find(c)) {
+            for axis in support.fixed() {
                 fixed.extend(held.iter().map(|&i| (active.nodes[i], axis)));
             }
         }
         fixed.sort_unstable();
         fixed.dedup();
         Ok(fixed)
+    }
+
+    /// Nodes that springs hold, ascending in `[z][y][x]`.
+    fn springs(&self, grid: &Fractions, active: &ActiveNodes) -> Result<Springs, VerifyError> {
+        let mut sums: BTreeMap<[usize; 3], Matrix3<f64>> = BTreeMap::new();
+        for support in &self.case.support {
+            if support.stiffness(1.0).is_none() {
+                continue;
+            }
+            let places = self.places(&support.on, "support", grid, active)?;
+            let total: f64 = places.iter().map(|p| p.weight).sum();
+            // Weights are areas on a surface, counts at nodes.
+            let voxels = if places.iter().any(|p| p.area != Vec3::zeros()) {
+                total / grid.h.powi(2)
+            } else {
+                total
+            };
+            let beneath = voxels * self.case.material.young * grid.h;
+            let stiffness = support.stiffness(beneath).unwrap_or_default() / total;
+            for place in places {
+                for ([x, y, z], weight) in weights(grid, active, &place.place) {
+                    *sums.entry([z, y, x]).or_default() += weight * place.weight * stiffness;
+                }
+            }
+        }
+        let nodes = sums.into_iter();
+        Ok(nodes.map(|([z, y, x], k)| ([x, y, z], k)).collect())
+    }
+
+    /// What a load or springs on a selection act on: points of its pieces, nodes where it meets none.
+    fn places(
+        &self,
+        name: &str,
+        what: &'static str,
+        grid: &Fractions,
+        active: &ActiveNodes,
+    ) -> Result<Vec<LoadPlace>, VerifyError> {
+        let places = self.pieces.of(&self.chosen(name)?);
+        if !places.is_empty() {
+            return Ok(places);
+        }
+        let nodes = node_places(grid, active);
+        let found = self.nodes_instead(name, what, &nodes, grid.h)?;
+        let at_node = |&i: &usize| LoadPlace {
+            place: nodes[i],
+            weight: 1.0,
+            area: Vec3::zeros(),
+        };
+        Ok(found.iter().map(at_node).collect())
     }
 
     /// Forces of one load case on nodes.
@@ -213,18 +275,7 @@ impl Site<'_> {
     ) -> Result<Forces, VerifyError> {
         let mut sums: BTreeMap<[usize; 3], Vec3> = BTreeMap::new();
         for load in &table.loads {
-            let chosen = self.chosen(&load.on)?;
-            let mut places = self.pieces.of(&chosen);
-            if places.is_empty() {
-                let nodes = node_places(grid, active);
-                let found = self.nodes_instead(&load.on, "load", &nodes, grid.h)?;
-                let at_node = |&i: &usize| LoadPlace {
-                    place: nodes[i],
-                    weight: 1.0,
-                    area: Vec3::zeros(),
-                };
-                places = found.iter().map(at_node).collect();
-            }
+            let mut places = self.places(&load.on, "load", grid, active)?;
             let first = places[0].place;
             places.retain(|p| !weights(grid, active, &p.place).is_empty());
             if places.is_empty() {
@@ -340,13 +391,13 @@ pub(super) fn around(problem: &Problem, node: [usize; 3]) -> impl Iterator<Item 
     })
 }
 
-/// Empties pieces without any fixed node; tells whether there were any.
-fn drop_loose(grid: &mut Fractions, fixed: &[([usize; 3], usize)], monitor: &Monitor) -> bool {
+/// Empties pieces without any held node; tells whether there were any.
+fn drop_loose(grid: &mut Fractions, held_nodes: &[[usize; 3]], monitor: &Monitor) -> bool {
     let solid: Vec<bool> = grid.values.iter().map(|&f| f > 0.0).collect();
     let (labels, pieces) = components(grid.dims, &solid);
     let problem = grid.problem();
     let mut held = vec![false; pieces.len()];
-    for v in fixed.iter().flat_map(|(node, _)| around(&problem, *node)) {
+    for v in held_nodes.iter().flat_map(|node| around(&problem, *node)) {
         if let Some(held) = held.get_mut(labels[v] as usize) {
             *held = true;
         }

@@ -64,10 +64,11 @@ pub(super) fn solve(
         let what = format!("proposal, voxels of {:.4} mm", problem.h / split as f64);
         monitor.step(STAGE, &what, 0.5 + 0.1 * split as f64)?;
         let problem = problem.cut(split);
-        let (fixed, cases) = conditions_on(case, &problem, folder, monitor)?;
+        let found = conditions_on(case, &problem, folder, monitor)?;
         let conditions = Conditions {
-            fixed,
-            loads: cases.into_iter().map(|c| c.forces).collect(),
+            fixed: found.fixed,
+            springs: found.springs,
+            loads: found.cases.into_iter().map(|c| c.forces).collect(),
         };
         let value = |v: usize| f64::from(u8::from(problem.is_active(v)));
         let grid = Fractions {

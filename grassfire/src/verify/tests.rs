@@ -6,7 +6,7 @@ use nalgebra::{Rotation3, Unit};
 
 use super::conditions::{ActiveNodes, Conditions, Pieces, spread};
 use super::*;
-use crate::case::{Load, LoadPlace, forces_on};
+use crate::case::{Load, LoadPlace, Spring, forces_on};
 use crate::mesh::shapes;
 use crate::remesh::split_long_edges;
 
@@ -200,6 +200,26 @@ fn a_bar_under_its_own_weight_is_as_long_as_it_should_be() {
     }
 }
 
+#[test]
+fn a_bar_on_springs_gives_way_with_them_but_takes_its_own_energy_only() {
+    let mut case = box_case([12.0, 4.0, 4.0], 0.0, [1000.0, 0.0, 0.0]);
+    case.support[0].fix.clear();
+    case.support[0].spring = Some(Spring {
+        stiffness: 5000.0,
+        along: None,
+    });
+    case.check().unwrap();
+    let mesh = shapes::cuboid(Vec3::zeros(), Vec3::new(12.0, 4.0, 4.0));
+    let exact = 0.5 * 1000.0 * 1000.0 * 12.0 / (70_000.0 * 16.0);
+    case.verify.h = Some(1.0);
+    let out = verify(&case, Path::new("."), &mesh, None, &Monitor::default()).unwrap();
+    for found in [&out.coarse, &out.fine] {
+        assert!((found.strain_energy / exact - 1.0).abs() < 1e-4);
+        assert!((found.u_max() - 0.2 - 2.0 * exact / 1000.0).abs() < 1e-4);
+        assert!(found.reaction_error() < 1e-5);
+    }
+}
+
 /// A bar with a neck, thinned until the neck tears: the bar itself is proved all the same.
 #[test]
 fn a_part_that_tears_at_equal_volume_is_proved_without_that() {
@@ -278,6 +298,7 @@ fn turned_cylinder_under_pressure_is_right() {
         let loads = sums.into_iter().map(|([z, y, x], f)| ([x, y, z], f.into()));
         let conditions = Conditions {
             fixed: held_without_force(&grid, &active),
+            springs: Vec::new(),
             loads: vec![loads.collect()],
         };
         let found =
