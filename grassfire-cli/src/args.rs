@@ -55,6 +55,11 @@ pub enum Command {
     },
     /// Prints the library of materials as a TOML file, to copy and change
     Materials,
+    /// Lists the faces of a STEP file, as selections of a project file ask for them
+    Faces {
+        /// STEP file
+        file: PathBuf,
+    },
     /// Prints the version, and with --cite the papers behind it
     About(AboutArgs),
     /// Prints a completion script for a shell

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use grassfire::case::{Built, Case, CaseError};
+use grassfire::case::{Built, Case, CaseError, step_faces};
 use grassfire::monitor::Monitor;
 use grassfire::pipeline::{self, OptimizeJob, RunJob, Stage, VerifyJob};
 
@@ -141,6 +141,38 @@ fn left(folder: &Path, names: &[&str]) -> Option<PathBuf> {
     let usable = |name: &&&str| cfg!(feature = "occt") || !name.ends_with(".step");
     let paths = names.iter().filter(usable).map(|name| folder.join(name));
     paths.into_iter().find(|path| path.is_file())
+}
+
+/// `grassfire faces`: a line for every face.
+pub fn faces(file: &Path) -> Result<String, Failure> {
+    let (_, faces) = step_faces(file).map_err(refused)?;
+    // No "-0.0000".
+    let rounded = |v: f64| (1e4 * v).round() / 1e4 + 0.0;
+    let vector = |v: [f64; 3]| {
+        let [x, y, z] = v.map(rounded);
+        format!("[{x:.4}, {y:.4}, {z:.4}]")
+    };
+    let mut text = String::new();
+    for (i, face) in faces.iter().enumerate() {
+        let like = &face.like;
+        text += &format!(
+            "{:4} {:8} {{ area = {:.4}, middle = {}, normal = {} }}",
+            i + 1,
+            face.surface,
+            like.area,
+            vector(like.middle),
+            vector(like.normal)
+        );
+        if !face.name.is_empty() {
+            text += &format!(" name {:?}", face.name);
+        }
+        if let Some(colour) = &face.colour {
+            text += &format!(" colour {colour:?}");
+        }
+        text.push('\n');
+    }
+    text += "area in mm2, middle in mm; in a project file: step_face = { path = \"...\", like = [{ ... }] }, or name, or colour\n";
+    Ok(text)
 }
 
 /// `grassfire check`.

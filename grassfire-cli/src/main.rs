@@ -46,6 +46,7 @@ fn dispatch(command: &Command) -> Result<u8, Failure> {
         Command::Check(args) => return case::check_command(args),
         Command::Schema { of } => run::print(&schema(*of)?),
         Command::Materials => run::print(grassfire::case::LIBRARY),
+        Command::Faces { file } => run::print(&case::faces(file)?),
         Command::About(args) => run::print(&about::text(args.cite)),
         Command::Completions { shell } => {
             clap_complete::generate(

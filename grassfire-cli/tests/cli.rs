@@ -61,6 +61,7 @@ fn help_names_the_commands() {
       demo         Runs everything on a built-in example
       schema       Prints the JSON Schema of all options (the keys of --set)
       materials    Prints the library of materials as a TOML file, to copy and change
+      faces        Lists the faces of a STEP file, as selections of a project file ask for them
       about        Prints the version, and with --cite the papers behind it
       completions  Prints a completion script for a shell
       man          Prints the manual page

@@ -19,6 +19,8 @@ mod build;
 #[cfg(feature = "occt")]
 mod casting;
 #[cfg(feature = "occt")]
+mod faces;
+#[cfg(feature = "occt")]
 mod inspect;
 #[cfg(feature = "occt")]
 mod names;
@@ -51,6 +53,7 @@ pub use {
     bores::Bore,
     build::{CadSolid, FaceSource, Joined, build, finish, join},
     casting::{FeederBody, write_casting},
+    faces::{FaceText, read_faces},
     inspect::NonDesignResult,
     non_design::{
         DesignSpace, NonDesignBody, Rebuilt, SpaceBore, from_boss, from_mesh, from_shape, read,

@@ -45,6 +45,13 @@ pub enum CaseError {
     },
     #[error("{key}: {path} is a STEP file and this build has no OpenCASCADE")]
     NoKernel { key: String, path: String },
+    #[error("{key}: {path} has no face like {wanted}; nearest: {nearest}")]
+    NoFace {
+        key: String,
+        path: String,
+        wanted: String,
+        nearest: String,
+    },
     #[error("the selection {name:?} holds no node of the grid")]
     EmptySelection { name: String },
     #[error(
@@ -107,6 +114,7 @@ impl CaseError {
             }
             Self::NotSolid { .. } => Some("export a closed mesh or STEP solid from CAD".into()),
             Self::NoKernel { .. } => Some("build with the default feature occt, or give STL".into()),
+            Self::NoFace { path, .. } => Some(format!("`grassfire faces {path}` lists them")),
             Self::EmptySelection { .. } => {
                 Some("`grassfire check` lists what every selection holds; look at its place, tolerance and units".into())
             }

@@ -4,6 +4,7 @@
 
 mod build;
 mod error;
+mod faces;
 mod grid;
 mod loads;
 mod materials;
@@ -24,6 +25,7 @@ use serde::{Deserialize, Serialize};
 pub use build::{Built, SelectionInfo, build};
 pub(crate) use build::{conditions_on, in_bodies};
 pub use error::CaseError;
+pub use faces::{FaceLike, StepFace, step_faces};
 pub(crate) use grid::place as place_grid;
 pub(crate) use loads::{LoadPlace, forces_on};
 pub use materials::LIBRARY;

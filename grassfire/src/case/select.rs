@@ -5,10 +5,12 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::faces::{FaceLike, Wanted, chosen, is_colour};
 use super::shape::{cylinder, read};
 use super::{Case, CaseError, finite, value};
 use crate::Vec3;
-use crate::mesh::Bvh;
+use crate::io::read_deck_set;
+use crate::mesh::{Bvh, TriMesh};
 use crate::monitor::Monitor;
 
 /// Tolerances in voxels: the corners of voxels lie beside the true surface.
@@ -77,6 +79,29 @@ pub enum Selector {
         /// Distance, mm.
         tolerance: Option<f64>,
     },
+    /// Near faces of a STEP file; `grassfire faces FILE` lists them.
+    StepFace {
+        /// Path, relative to the project file.
+        path: String,
+        /// Faces that look like these.
+        #[serde(default)]
+        like: Vec<FaceLike>,
+        /// All faces of this name.
+        name: Option<String>,
+        /// All faces of this colour, such as `#ff8000`.
+        colour: Option<String>,
+        /// Distance, mm.
+        tolerance: Option<f64>,
+    },
+    /// Near the element faces of a set of an Abaqus or CalculiX deck.
+    Deck {
+        /// Path, relative to the project file.
+        path: String,
+        /// Node set, element set or surface.
+        set: String,
+        /// Distance, mm.
+        tolerance: Option<f64>,
+    },
     /// In all of some selections.
     All(Vec<String>),
     /// In any of some selections.
@@ -135,7 +160,35 @@ impl Selector {
                     known,
                 })
             }
-            Self::File { tolerance, .. } => finite(&key, tolerance),
+            Self::File { tolerance, .. } | Self::Deck { tolerance, .. } => finite(&key, tolerance),
+            Self::StepFace {
+                like,
+                name,
+                colour,
+                tolerance,
+                ..
+            } => {
+                finite(&key, tolerance)?;
+                if let Some(bad) = colour.as_deref().filter(|c| !is_colour(c)) {
+                    return Err(value(
+                        &key,
+                        format!("{bad:?}"),
+                        "a colour such as \"#ff8000\"",
+                    ));
+                }
+                if like.is_empty() && name.is_none() && colour.is_none() {
+                    return Err(value(&key, "empty", "like, name or colour of its faces"));
+                }
+                like.iter().try_for_each(|like| {
+                    finite(
+                        &key,
+                        [&like.area]
+                            .into_iter()
+                            .chain(&like.middle)
+                            .chain(&like.normal),
+                    )
+                })
+            }
             Self::All(names) | Self::Any(names) => {
                 names.iter().try_for_each(|n| refer(name, n, &key, case))
             }
@@ -228,9 +281,30 @@ impl Nodes<'_> {
             }
             Selector::File { path, tolerance } => {
                 let mesh = read(&self.folder.join(path), "select", 1.0, monitor)?;
-                let bvh = Bvh::new(&mesh);
-                let limit = tolerance.unwrap_or(RADIAL * h);
-                each(&|p| bvh.nearest(p, limit).is_some())
+                self.near(&mesh, tolerance)
+            }
+            Selector::StepFace {
+                path,
+                like,
+                name,
+                colour,
+                tolerance,
+            } => {
+                let wanted = Wanted {
+                    like,
+                    name: name.as_deref(),
+                    colour: colour.as_deref(),
+                };
+                let mesh = chosen(&self.folder.join(path), "select", wanted)?;
+                self.near(&mesh, tolerance)
+            }
+            Selector::Deck {
+                path,
+                set,
+                tolerance,
+            } => {
+                let mesh = read_deck_set(&self.folder.join(path), set, monitor)?;
+                self.near(&mesh, tolerance)
             }
             Selector::All(names) => self.combine(names, true, |a, b| a && b, monitor)?,
             Selector::Any(names) => self.combine(names, false, |a, b| a || b, monitor)?,
@@ -240,6 +314,13 @@ impl Nodes<'_> {
                 other.into_iter().map(|o| !o).collect()
             }
         })
+    }
+
+    fn near(&self, mesh: &TriMesh, tolerance: &Option<f64>) -> Vec<bool> {
+        let tree = Bvh::new(mesh);
+        let limit = tolerance.unwrap_or(RADIAL * self.slack);
+        let places = self.places.iter();
+        places.map(|p| tree.nearest(p, limit).is_some()).collect()
     }
 
     fn combine(

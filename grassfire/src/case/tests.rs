@@ -130,6 +130,19 @@ fn bad_cases_are_refused_by_name() {
     assert!(e.to_string().contains("t/mm3"), "{e}");
     let e = broken("[optimize]", "gravity = [0, 0, -9810]\n[optimize]");
     assert!(e.to_string().contains("material.density"), "{e}");
+    let face = |what: &str| format!("ring = {{ step_face = {{ path = \"nothing.step\"{what} }} }}");
+    let e = broken("ring = { body = { name = \"ring\" } }", &face(""));
+    assert!(e.to_string().contains("like, name or colour"), "{e}");
+    let e = broken(
+        "ring = { body = { name = \"ring\" } }",
+        &face(", colour = \"red\""),
+    );
+    assert!(e.to_string().contains("#ff8000"), "{e}");
+    let e = broken(
+        "ring = { body = { name = \"ring\" } }",
+        &face(", name = \"red\""),
+    );
+    assert!(matches!(e, CaseError::MissingFile { .. }), "{e}");
     let e = broken("{ on = \"ring\", force", "{ on = \"corner\", moment");
     assert!(matches!(e, CaseError::Moment { .. }), "{e}");
 }

@@ -5,6 +5,7 @@
 
 mod atomic;
 mod control;
+mod deck;
 mod density;
 mod detect;
 mod error;
@@ -36,6 +37,7 @@ use serde::{Deserialize, Serialize};
 
 pub use atomic::atomic_write;
 pub use control::{read_control_mesh, read_control_mesh_bytes, write_control_mesh};
+pub use deck::read_deck_set;
 pub use error::IoError;
 pub use medial::{read_medial, read_medial_bytes, write_medial};
 pub use ply_write::{write_ply, write_poles};
