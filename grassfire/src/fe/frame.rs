@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use nalgebra::Matrix3;
 
 use super::grid::NodeGrid;
+use super::rigid::RigidModes;
 use super::springs::{SpringNode, spring_nodes};
 
 /// The finest grid and what holds it.
@@ -14,6 +15,8 @@ pub(super) struct Frame {
     pub fixed: Vec<usize>,
     /// Nodes that springs hold.
     pub springs: Vec<SpringNode>,
+    /// Motions of the part that only they hold.
+    pub rigid: Option<RigidModes>,
     /// By number of the element `[z][y][x]`: bit `3 corner + component` is set where fixed.
     masks: HashMap<usize, u32>,
     /// The elements of `masks`, ascending.
@@ -53,14 +56,17 @@ impl Frame {
             }
         }
         masked.sort_unstable();
-        Self {
+        let mut out = Self {
             springs: spring_nodes(&grid, &places, springs),
+            rigid: None,
             grid,
             fixed: places,
             masks,
             masked,
             rows,
-        }
+        };
+        out.rigid = RigidModes::new(&out, fixed);
+        out
     }
 
     /// All elements with fixed corners, in order.

@@ -17,6 +17,7 @@ mod mechanism;
 mod multigrid;
 mod parity;
 mod pcg;
+mod rigid;
 mod rows;
 mod smoother;
 mod solver;

@@ -155,6 +155,12 @@ impl Multigrid {
         self.levels.first().map_or(&self.coarse_x, |level| &level.x)
     }
 
+    /// [`Multigrid::result`], to be corrected.
+    pub fn result_mut(&mut self) -> &mut [f32] {
+        let first = self.levels.first_mut();
+        first.map_or(&mut self.coarse_x, |level| &mut level.x)
+    }
+
     fn solve(&mut self, finest: Fine, r: &[f64], l: usize) {
         if l == self.levels.len() {
             self.coarse.solve(&self.coarse_b, &mut self.coarse_x);

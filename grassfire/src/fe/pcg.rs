@@ -50,7 +50,7 @@ pub(super) fn solve(
     let mut iterations = 0;
     while residual > tolerance * size && iterations < most {
         monitor.check()?;
-        multigrid.cycle(fine, &r);
+        precondition(fine, multigrid, &mut r);
         let z = multigrid.result();
         let rz = dot(&r, z);
         if rz.is_nan() || rz <= 0.0 {
@@ -91,4 +91,16 @@ pub(super) fn solve(
         residual,
         converged: residual <= tolerance,
     })
+}
+
+/// One cycle of the multigrid for the residual `r`, in which motions that only springs hold are solved for apart.
+fn precondition(fine: Fine, multigrid: &mut Multigrid, r: &mut [f64]) {
+    let Some(rigid) = &fine.frame.rigid else {
+        return multigrid.cycle(fine, r);
+    };
+    let by = rigid.answer(fine.frame, r);
+    let before = rigid.take_off(&by, r);
+    multigrid.cycle(fine, r);
+    rigid.put_back(&before, r);
+    rigid.exchange(fine.frame, &by, multigrid.result_mut());
 }

@@ -325,3 +325,24 @@ fn stiff_springs_along_a_slanting_normal_do_not_slow_the_solver_down() {
         assert!(u.dot(&n).abs() < 0.02 * end.norm(), "{u} {end}");
     }
 }
+
+#[test]
+fn a_part_on_springs_far_softer_than_itself_converges() {
+    // The springs give way a million times as much as the bar: single precision alone cannot tell them from nothing.
+    for (soft, along) in [(1e-6, [1.0, 0.0, 0.0]), (1e-6, [0.0, 0.3, -1.0])] {
+        let model = sprung(|_| Matrix3::identity() * soft, along);
+        let options = SolverOptions {
+            tolerance: 1e-6,
+            coarsest: 600,
+            ..SolverOptions::default()
+        };
+        let mut solver = Solver::new(model, &[1.0; 40 * 64], &options).unwrap();
+        let stats = solver.solve(0, &Monitor::default()).unwrap();
+        println!("{stats:?}");
+        assert!(stats.iterations <= 40, "{stats:?}");
+        let reactions = solver.reactions();
+        for (found, load) in reactions.iter().zip(along) {
+            assert!((found + load).abs() < 1e-4, "{reactions:?}");
+        }
+    }
+}

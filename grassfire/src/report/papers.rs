@@ -228,6 +228,13 @@ pub const ALL: &[Paper] = &[
         used_for: "what gravity does to thin material",
     },
     Paper {
+        key: "tang2009",
+        citation: "J. M. Tang, R. Nabben, C. Vuik, Y. A. Erlangga (2009): Comparison of two-level preconditioners derived from deflation, domain decomposition and multigrid methods. Journal of Scientific Computing 39.",
+        doi: "10.1007/s10915-009-9272-6",
+        stages: &["optimize", "verify"],
+        used_for: "rigid motions on soft springs",
+    },
+    Paper {
         key: "zhu2009",
         citation: "J. Zhu, W. Zhang, P. Beckers (2009): Integrated layout design of multi-component system. International Journal for Numerical Methods in Engineering 78.",
         doi: "10.1002/nme.2499",
