@@ -284,6 +284,9 @@ pub struct CheckArgs {
     /// Project file (TOML)
     #[arg(value_name = "CASE")]
     pub case: PathBuf,
+    /// Folder for pictures of what the selections hold; made when missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
     /// What all runs share.
     #[command(flatten)]
     pub run: RunArgs,

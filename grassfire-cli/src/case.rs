@@ -183,7 +183,13 @@ pub fn check_command(args: &CheckArgs) -> Result<u8, Failure> {
     for warning in monitor.warnings() {
         eprintln!("warning: {}: {}", warning.stage, warning.text);
     }
-    run::print(&describe(&case, &built));
+    let mut text = describe(&case, &built);
+    if let Some(folder) = &args.output {
+        for path in pipeline::draw_case(&built, folder)? {
+            text += &format!("picture     {}\n", path.display());
+        }
+    }
+    run::print(&text);
     Ok(0)
 }
 

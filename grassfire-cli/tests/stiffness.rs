@@ -106,6 +106,27 @@ fn what_cannot_be_verified_is_refused_and_nothing_is_written() {
 }
 
 #[test]
+fn check_draws_what_the_selections_hold() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("case.toml");
+    std::fs::write(&file, PLATE).expect("writable");
+    let pictures = folder.path().join("deep/pictures");
+    let output = grassfire(&[
+        "check",
+        &file.display().to_string(),
+        "-o",
+        &pictures.display().to_string(),
+    ]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    for name in ["check.png", "check-below.png"] {
+        assert!(text.contains(name), "{text}");
+        let bytes = std::fs::read(pictures.join(name)).expect("a picture");
+        assert!(bytes.starts_with(b"\x89PNG"));
+    }
+}
+
+#[test]
 fn bad_cases_end_with_exit_code_2_and_the_reason() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("case.toml");

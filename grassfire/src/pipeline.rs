@@ -6,6 +6,7 @@ mod bodies;
 #[cfg(feature = "occt")]
 mod case_bodies;
 mod casting;
+mod check;
 mod construct;
 mod deliver;
 mod edits;
@@ -36,9 +37,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use casting::{SolidJob, mould_solid, solidify_solid};
+pub use check::{check_case, draw_case};
 pub use error::{PipelineError, StageError};
 pub use exchange::{FileOptions, Format};
-pub use optimize::{OptimizeJob, check_case, optimize};
+pub use optimize::{OptimizeJob, optimize};
 pub use repairs::Loads;
 pub use run::{RunJob, Stage, run, share_optimization};
 pub use shape::RetryOptions;

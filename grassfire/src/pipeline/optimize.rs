@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
+use super::check::check_case;
 use super::deliver::Delivery;
 use super::error::{PipelineError, StageError};
 use super::proposal::{self, ISO, kept};
 use super::record::Record;
 use super::{Outcome, finish, inputs};
 use crate::Vec3;
-use crate::case::{self, Built, Case, Shape};
+use crate::case::{Built, Case, Shape};
 use crate::io;
 use crate::monitor::{Cancelled, Monitor};
 use crate::remesh::{Draw, RemeshOptions, drawn_surface, iso_surface};
@@ -85,21 +86,6 @@ impl OptimizeJob {
             .chain(shapes.filter_map(path))
             .collect()
     }
-}
-
-/// Builds the voxels of a case and checks everything that can be checked without solving.
-///
-/// # Errors
-/// [`PipelineError`] with the stage `case`.
-pub fn check_case(case: &Case, path: &Path, monitor: &Monitor) -> Result<Built, PipelineError> {
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let fail = |source: StageError| PipelineError {
-        stage: "case",
-        source,
-    };
-    let built = case::build(case, folder, monitor).map_err(|e| fail(e.into()))?;
-    topopt::validate(&built.problem, &case.optimize, &case.solver).map_err(|e| fail(e.into()))?;
-    Ok(built)
 }
 
 /// Optimizes a case.

@@ -11,6 +11,7 @@
 
 mod camera;
 mod canvas;
+pub mod conditions;
 mod finish;
 mod legend;
 pub mod pictures;
