@@ -318,7 +318,8 @@ fn node_diagonal(grid: &NodeGrid, e: &[f64], k: f64, inverse: &mut [f32]) {
             0.0
         }
     };
-    sums_around(grid, e, inverse, of_sum);
+    // Rounded, as the operator of the cycle rounds them.
+    sums_around(grid, e, |e| f64::from(e as f32), inverse, of_sum);
 }
 
 /// The inverse diagonal blocks of the nodes that springs hold: they take the place of the numbers there, which become zero.

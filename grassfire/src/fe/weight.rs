@@ -46,7 +46,13 @@ impl Weight {
     }
 
     fn sum_up(&mut self, grid: &NodeGrid) {
-        sums_around(grid, &self.shares, &mut self.nodes, |sum| sum / 8.0);
+        sums_around(
+            grid,
+            &self.shares,
+            |share| share,
+            &mut self.nodes,
+            |sum| sum / 8.0,
+        );
     }
 
     /// Forces of a body force (N/mm3) on free degrees of freedom as places and values, ascending; elements have edge `h`.

@@ -73,10 +73,11 @@ impl<T: Copy + Default> Window<T> {
     }
 }
 
-/// For every node `value` of the sum of a field of elements over the eight around it.
+/// For every node `value` of the sum of a field of elements, each after `convert`, over the eight around it.
 pub(super) fn sums_around<T: Send>(
     grid: &NodeGrid,
     field: &[f64],
+    convert: impl Fn(f64) -> f64 + Sync,
     out: &mut [T],
     value: impl Fn(f64) -> T + Sync,
 ) {
@@ -86,7 +87,7 @@ pub(super) fn sums_around<T: Send>(
         |around, (z, out)| {
             around.clear();
             for y in 0..=grid.n[1] {
-                around.load(grid, field, |v| v, y, z);
+                around.load(grid, field, &convert, y, z);
                 for run in grid.row(y, z) {
                     for (x, out) in (run.x..).zip(&mut out[run.at..][..run.len]) {
                         let element = |i: usize| {

@@ -47,10 +47,10 @@ impl Interpolation {
         rho.par_iter().map(value).collect()
     }
 
-    /// Derivative of the modulus of a density.
-    pub fn slope(&self, rho: f64) -> f64 {
-        let powers = self.penalty * rho.powf(self.penalty - 1.0);
-        let shape = self.linear + (1.0 - self.linear) * powers;
-        shape * (1.0 - self.e_min) * self.young
+    /// Derivative of the compliance by a density, but for body forces: minus that of the modulus, times `energy` for modulus 1.
+    pub fn gradient(&self, energy: f64, rho: f64) -> f64 {
+        let slope = -self.penalty * (1.0 - self.e_min) * self.young;
+        let powers = rho.powf(self.penalty - 1.0);
+        energy * slope * (self.linear / self.penalty + (1.0 - self.linear) * powers)
     }
 }

@@ -349,7 +349,7 @@ impl<'a> Run<'a> {
         let rho = eroded.as_ref().unwrap_or(&self.state.rho);
         let law = Interpolation::new(self.problem, self.options.e_min, penalty);
         let g = self.energy.par_iter().zip(rho);
-        let mut g: Vec<f64> = g.map(|(energy, &rho)| -energy * law.slope(rho)).collect();
+        let mut g: Vec<f64> = g.map(|(e, &rho)| law.gradient(*e, rho)).collect();
         // The work of forces that follow the densities counts twice: f'u changes by f and by u.
         let works = g.par_iter_mut().zip(&self.work);
         works.for_each(|(g, work)| *g += 2.0 * work);

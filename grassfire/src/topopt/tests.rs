@@ -122,7 +122,7 @@ fn evaluate(
         let mut energies = vec![0.0; x.len()];
         solver.add_energies(1.0, &design, &mut energies);
         for (i, energy) in energies.into_iter().enumerate() {
-            g[i] -= case.weight * law.slope(stiff[i]) * energy;
+            g[i] += case.weight * law.gradient(energy, stiff[i]);
         }
         solver.add_body_work(2.0 * case.weight, &design, &mut g);
     }
