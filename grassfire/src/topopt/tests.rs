@@ -229,6 +229,9 @@ fn an_arch_carries_a_deck_and_its_own_weight() {
     let mut options = OptimizeOptions {
         volume_fraction: 0.5,
         max_iterations: 80,
+        penalty_every: 3,
+        beta_start: 24,
+        beta_every: 8,
         ..OptimizeOptions::default()
     };
     let out = run(&problem, &options);
