@@ -336,7 +336,7 @@ fn two_and_three_feeders_are_the_best_of_all_sets_on_small_sheets() {
 
 #[test]
 fn balls_in_junctions_of_equal_walls_are_larger_by_known_factors() {
-    // Walls of 4 mm on voxels of 0.5 mm; the middle of the junction lies at the origin.
+    // Walls of 4 mm on voxels of 0.5 mm, on which radii are known to a fifth of a voxel.
     let wall = |lo: [f64; 2], hi: [f64; 2]| {
         crate::mesh::shapes::cuboid(Vec3::new(lo[0], 0.0, lo[1]), Vec3::new(hi[0], 20.0, hi[1]))
     };
@@ -366,10 +366,7 @@ fn balls_in_junctions_of_equal_walls_are_larger_by_known_factors() {
         let axis = crate::medial::medial_axis(&solid.field, &Default::default(), &monitor)
             .expect("it has an axis");
         let largest = axis.mesh.radii.iter().copied().fold(0.0, f64::max);
-        assert!(
-            (largest / 2.0 / factor - 1.0).abs() < 0.02,
-            "{largest} {factor}"
-        );
+        assert!((largest - 2.0 * factor).abs() < 0.1, "{largest} {factor}");
     }
 }
 

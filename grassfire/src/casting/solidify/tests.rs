@@ -316,23 +316,23 @@ fn a_plate_with_two_bosses_freezes_last_in_them() {
 
 #[test]
 fn a_step_wedge_freezes_towards_its_thick_end() {
-    let steps = [8.0, 12.0, 16.0, 20.0];
-    let wedge = |(n, height): (usize, &f64)| {
-        let x = 24.0 * n as f64;
-        [x, 0.0, 0.0, x + 24.0, 40.0, *height]
-    };
-    let mesh = boxes(&steps.iter().enumerate().map(wedge).collect::<Vec<_>>());
+    // Where a step begins, and how high it is; the last one is long, so that its end does not cool all of it.
+    let steps = [[0.0, 8.0], [24.0, 12.0], [48.0, 16.0], [72.0, 20.0]];
+    let ends = [24.0, 48.0, 72.0, 132.0];
+    let wedge = |([x, height], end): (&[f64; 2], &f64)| [*x, 0.0, 0.0, *end, 40.0, *height];
+    let mesh = boxes(&steps.iter().zip(&ends).map(wedge).collect::<Vec<_>>());
     let options = SolidifyOptions {
-        cell: Some(2.0),
-        steps: 60,
+        cell: Some(2.5),
+        steps: 40,
         ..SolidifyOptions::default()
     };
     let found = solidify(&mesh, &options, &Monitor::default()).expect("it freezes");
     assert_eq!(found.hot_spots.len(), 1, "{:?}", found.places);
     let last = found.places[0];
-    assert!(last.x > 72.0 && (last.y - 20.0).abs() < 4.0, "{last:?}");
-    let times = steps.iter().enumerate().map(|(n, height)| {
-        let middle = Vec3::new(24.0 * n as f64 + 12.0, 20.0, height / 2.0);
+    assert!(last.x > 74.0 && (last.y - 20.0).abs() < 4.0, "{last:?}");
+    let middles = steps.iter().zip(&ends);
+    let times = middles.map(|([x, height], end)| {
+        let middle = Vec3::new((x + end) / 2.0, 20.0, height / 2.0);
         found.time.sample(&middle)
     });
     let times: Vec<f64> = times.collect();
