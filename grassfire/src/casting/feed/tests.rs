@@ -335,42 +335,6 @@ fn two_and_three_feeders_are_the_best_of_all_sets_on_small_sheets() {
 }
 
 #[test]
-fn balls_in_junctions_of_equal_walls_are_larger_by_known_factors() {
-    // Walls of 4 mm on voxels of 0.5 mm, on which radii are known to a fifth of a voxel.
-    let wall = |lo: [f64; 2], hi: [f64; 2]| {
-        crate::mesh::shapes::cuboid(Vec3::new(lo[0], 0.0, lo[1]), Vec3::new(hi[0], 20.0, hi[1]))
-    };
-    let junctions = [
-        (1.25, [[-14.0, -2.0, 14.0, 2.0], [-2.0, -2.0, 2.0, 14.0]]),
-        (
-            2.0_f64.sqrt(),
-            [[-14.0, -2.0, 14.0, 2.0], [-2.0, -14.0, 2.0, 14.0]],
-        ),
-        (
-            4.0 - 2.0 * 2.0_f64.sqrt(),
-            [[-2.0, -2.0, 14.0, 2.0], [-2.0, -2.0, 2.0, 14.0]],
-        ),
-    ];
-    for (factor, walls) in junctions {
-        let mut mesh = crate::mesh::TriMesh::default();
-        for [x0, z0, x1, z1] in walls {
-            let wall = wall([x0, z0], [x1, z1]);
-            mesh.append(wall.points, wall.triangles);
-        }
-        let monitor = Monitor::default();
-        let options = crate::remesh::RemeshOptions {
-            voxel: Some(0.5),
-            ..Default::default()
-        };
-        let solid = crate::remesh::remesh(&mesh, &options, &monitor).expect("a solid");
-        let axis = crate::medial::medial_axis(&solid.field, &Default::default(), &monitor)
-            .expect("it has an axis");
-        let largest = axis.mesh.radii.iter().copied().fold(0.0, f64::max);
-        assert!((largest - 2.0 * factor).abs() < 0.1, "{largest} {factor}");
-    }
-}
-
-#[test]
 fn the_growth_factors_agree() {
     for (area, slope) in [(1.05, 0.0122), (1.1, 0.0238), (1.2, 0.0455), (1.5, 0.1010)] {
         let options = FeedOptions {
