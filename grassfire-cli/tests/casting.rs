@@ -96,7 +96,14 @@ fn feeding_that_cannot_be_is_refused() {
     let draft = ["feed.draft=2", "feed.draw=[1,0,0]", "feed.parting=-20"];
     let mut args = vec!["--feeder", "18,0,2.5", "--growth", "0.05"];
     draft.iter().for_each(|set| args.extend(["--set", *set]));
-    refused(place(&args), 3, "contradict each other: around");
+    let contradicts = place(&args);
+    // Two places of the cycle, and by how much a radius would have to exceed itself.
+    let said = contradicts.lines("error: ").join("");
+    assert!(
+        said.matches('(').count() >= 2 && said.contains("mm larger than itself"),
+        "{said}"
+    );
+    refused(contradicts, 3, "contradict each other: around");
     let plates = two_plates(folder.path());
     let args = ["--voxel", "0.8", "--feeder", "18,0,2.5"];
     let apart = reconstruct(&plates, &folder.path().join("out"), &args);
@@ -114,7 +121,11 @@ fn freezing_without_data_or_sand_and_moulds_without_undercut_are_refused() {
             vec!["--set", "solidify.material=bronze"],
             "bronze",
         ),
-        ("solidify", vec!["--set", "solidify.padding=0.1"], "padding"),
+        (
+            "solidify",
+            vec!["--set", "solidify.padding=0.1"],
+            "the sand must be at least",
+        ),
         (
             "mould",
             vec![
@@ -164,6 +175,37 @@ fn a_proposal_with_an_undercut_is_filled_before_its_skeleton_is_made() {
     let left = number(&report, "/mould/undercut_volume");
     let hole = std::f64::consts::PI * HOLE * HOLE * THICK;
     assert!(left < 0.1 * hole, "{left}");
+}
+
+#[test]
+fn a_core_stays_open_when_sections_grow_and_gaps_close() {
+    // Along x the hole is undercut. It is narrower than the least gap, before and after the plate grows.
+    let folder = tempfile::tempdir().expect("a folder");
+    let args = [
+        "--draw",
+        "1,0,0",
+        "--set",
+        "mould.cores=[[0,0,2.5]]",
+        "--set",
+        "mould.repair=fill",
+        "--set",
+        "mould.min_gap=25",
+        "--feeder",
+        "18,0,2.5",
+        "--growth",
+        "0.05",
+        "--recognise",
+        "off",
+    ];
+    let run = run_plate(folder.path(), &args);
+    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+    let report = run.report();
+    assert_eq!(report["topology"]["solid"]["b1"], 1);
+    assert!(number(&report, "/feed/added_volume") > 100.0);
+    assert_eq!(number(&report, "/mould/multiple_lines"), 0.0);
+    let hole = std::f64::consts::PI * HOLE * HOLE * THICK;
+    let left = number(&report, "/mould/undercut_volume");
+    assert!(left > 0.6 * hole && left < 1.2 * hole, "{left} {hole}");
 }
 
 /// A prism along y as binary STL; its section is made of rectangles (low x, low z, high x, high z) that share whole edges.

@@ -75,7 +75,7 @@ fn placement() {
         "placement on {} points, 1000 candidates: feeders, s",
         skeleton.points.len()
     );
-    for count in [1, 2] {
+    for count in [1, 2, 3] {
         let clock = Instant::now();
         let options = FeedOptions::default();
         place_feeders(&skeleton, &[], &all, count, &options, &Monitor::default())

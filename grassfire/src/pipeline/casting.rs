@@ -141,7 +141,7 @@ pub(super) fn drawn_out(
     }
     let (repaired, solid) = record.stage("mould", || {
         mould::check(&options.mould)?;
-        repaired(from, bodies, options, &options.mould, monitor)
+        repaired(from, bodies, options, &options.mould, false, monitor)
     })?;
     record.report.mould = Some(MouldBlock {
         repaired_volume: Some(repaired.volume[1]),
@@ -154,7 +154,7 @@ pub(super) fn drawn_out(
 
 /// What has grown after a repair, repaired once more where gaps must not be narrow (`mould.min_gap`): what growth left of a gap may
 /// be too narrow for sand, and two walls that wave towards each other have no skeleton worth having. Sides that were removed stay
-/// away.
+/// away, cores stay open where growth has not closed them.
 ///
 /// # Errors
 /// Those of the repair and of the remesh.
@@ -171,15 +171,16 @@ pub(super) fn drawn_out_again(
     if asked.draw.is_none() || asked.min_gap <= 0.0 {
         return Ok(from);
     }
-    Ok(repaired(&from, bodies, options, &asked, monitor)?.1)
+    Ok(repaired(&from, bodies, options, &asked, true, monitor)?.1)
 }
 
-/// A solid repaired on its own voxels as `asked`, and remeshed on them.
+/// A solid repaired on its own voxels as `asked`, and remeshed on them; undercuts of cores may have closed in one that has `grown`.
 fn repaired(
     from: &Remeshed,
     bodies: &Bodies,
     options: &ReconstructOptions,
     asked: &MouldOptions,
+    grown: bool,
     monitor: &Monitor,
 ) -> Result<(mould::Repaired, Remeshed), StageError> {
     let (mesh, cell) = (from.solid.mesh(), from.field.spacing);
@@ -187,6 +188,7 @@ fn repaired(
     let (_, height) = parting(&dexels(mesh, &draw, asked.lines));
     let mut asked = asked.repair_options(height, cell);
     asked.bores.clone_from(&bodies.bosses.free);
+    asked.cores_may_close = grown;
     let repaired = mould::repair(mesh, &draw, &asked, monitor)?;
     let mut on_grid = RemeshOptions {
         voxel: Some(cell),

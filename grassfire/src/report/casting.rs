@@ -246,6 +246,9 @@ fn feed(block: &FeedBlock) -> Markup {
             div { dt { "After" } dd { (count(block.violations)) " of " (count(block.rules_after)) } }
             div { dt { "Metal added" } dd { (with_unit(block.added_volume, 4, "mm³")) } }
             div { dt { "Ways to the feeder where balls shrink, before and after" } dd { (with_unit(100.0 * block.falling_before.falling, 3, "%")) ", " (with_unit(100.0 * block.falling.falling, 3, "%")) } }
+            @if block.falling.largest > 0.0 {
+                div { dt { "Largest fall left" } dd { (with_unit(block.falling.largest, 2, "mm")) ", from " (place(&block.falling.between[0])) " to " (place(&block.falling.between[1])) } }
+            }
             div { dt { "Casting yield" } dd { (with_unit(100.0 * block.casting_yield, 3, "%")) } }
         }
         @if !block.zones.is_empty() {

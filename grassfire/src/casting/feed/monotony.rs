@@ -17,6 +17,8 @@ pub struct Monotony {
     pub falling: f64,
     /// Largest such difference, mm.
     pub largest: f64,
+    /// Where the larger ball of that difference lies, and the smaller one after it, mm.
+    pub between: [[f64; 3]; 2],
 }
 
 /// Looks at the radii of a medial axis on the way from `count` far points to the feeders.
@@ -67,18 +69,23 @@ pub fn monotony(
             .iter_mut()
             .zip(around)
             .for_each(|(a, d)| *a = a.min(d));
-        let mut largest = graph.radii[start];
+        let mut largest = start;
         let mut at = start;
         while to_feeder.parent[at] as usize != at {
             let next = to_feeder.parent[at] as usize;
             let step = (graph.points[next] - graph.points[at]).norm();
             out.length += step;
-            let below = largest - graph.radii[next];
+            let below = graph.radii[largest] - graph.radii[next];
             if below > tolerance {
                 falling += step;
-                out.largest = out.largest.max(below);
             }
-            largest = largest.max(graph.radii[next]);
+            if below > tolerance.max(out.largest) {
+                out.largest = below;
+                out.between = [largest, next].map(|v| graph.points[v].into());
+            }
+            if below < 0.0 {
+                largest = next;
+            }
             at = next;
         }
         out.paths += 1;
@@ -110,5 +117,6 @@ mod tests {
         assert_eq!((grows.paths, grows.falling), (1, 0.0));
         let neck = monotony(&bar(&[1.0, 4.0, 3.0, 3.5, 5.0, 6.0]), &feeder, 0.0, 1, 0.1);
         assert!((neck.falling - 0.4).abs() < 1e-12 && (neck.largest - 1.0).abs() < 1e-12);
+        assert_eq!(neck.between.map(|p| p[0]), [10.0, 20.0]);
     }
 }

@@ -12,6 +12,9 @@ use super::{check, shape};
 use crate::monitor::Monitor;
 use crate::skeleton::Skeleton;
 
+/// As many sets are all tried.
+const ALL: usize = 1000;
+
 /// A set of feeders and what it costs.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Placement {
@@ -33,8 +36,8 @@ impl Placement {
 /// The cheapest places for `count` feeders among `candidates` (skeleton points).
 ///
 /// The cost is the metal that feeding adds to the part plus that of the feeders ([`feeder_size`]).
-/// 1. One feeder: every candidate is tried.
-/// 2. More: the best one more is added to those chosen so far; then, as long as that saves metal, one of them is moved to
+/// 1. One feeder: every candidate is tried; likewise every set of more feeders where there are at most a thousand.
+/// 2. Else the best one more is added to those chosen so far; then, as long as that saves metal, one of them is moved to
 ///    the best other candidate. The result is at least as good as every single exchange, not always the best of all sets.
 ///
 /// Places that do not reach all of the part cost infinitely much. O(candidates * count * E log V) a round; the result does
@@ -60,11 +63,16 @@ pub fn place_feeders(
         contacts,
         options,
     };
+    let sets = sets(candidates, count);
     let mut best = Placement::default();
-    for _ in 0..count {
-        best = site.extended(&best.points, candidates, monitor)?;
+    if sets.is_empty() {
+        for _ in 0..count {
+            best = site.extended(&best.points, candidates, monitor)?;
+        }
+    } else {
+        best = site.cheapest(&sets, monitor)?;
     }
-    let mut moved = count > 1;
+    let mut moved = count > 1 && sets.is_empty();
     while moved {
         moved = false;
         for k in 0..count {
@@ -99,11 +107,19 @@ impl Site<'_> {
         candidates: &[u32],
         monitor: &Monitor,
     ) -> Result<Placement, FeedError> {
-        let tried = candidates.par_iter().map(|&candidate| {
-            monitor.check()?;
+        let extended = candidates.iter().map(|&candidate| {
             let mut points = chosen.to_vec();
             points.push(candidate);
-            self.cost(points)
+            points
+        });
+        self.cheapest(&extended.collect::<Vec<_>>(), monitor)
+    }
+
+    /// The set that costs least.
+    fn cheapest(&self, sets: &[Vec<u32>], monitor: &Monitor) -> Result<Placement, FeedError> {
+        let tried = sets.par_iter().map(|points| {
+            monitor.check()?;
+            self.cost(points.clone())
         });
         let tried: Vec<Placement> = tried.collect::<Result<_, FeedError>>()?;
         let unreached = |p: &Placement| (p.cost(), p.feeders);
@@ -152,6 +168,28 @@ impl Site<'_> {
             feeders,
         })
     }
+}
+
+/// All sets of `count` candidates; none when there are more than [`ALL`].
+fn sets(candidates: &[u32], count: usize) -> Vec<Vec<u32>> {
+    let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
+    for _ in 0..count {
+        let mut longer = Vec::new();
+        for set in &sets {
+            let from = set.last().map_or(0, |last| last + 1);
+            for next in from..candidates.len() {
+                let mut set = set.clone();
+                set.push(next);
+                longer.push(set);
+            }
+            if longer.len() > ALL {
+                return Vec::new();
+            }
+        }
+        sets = longer;
+    }
+    let places = |set: &Vec<usize>| set.iter().map(|n| candidates[*n]).collect();
+    sets.iter().map(places).collect()
 }
 
 fn seeds(points: &[u32]) -> Vec<Seed> {

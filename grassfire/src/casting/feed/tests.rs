@@ -310,6 +310,31 @@ fn placement_is_the_best_of_all_candidates() {
 }
 
 #[test]
+fn two_and_three_feeders_are_the_best_of_all_sets_on_small_sheets() {
+    let (monitor, options) = (Monitor::default(), FeedOptions::default());
+    for seed in [12, 13] {
+        let skeleton = sheet(3, 60.0, &mut Dice(seed));
+        let cost = |candidates: &[u32], count: usize| {
+            let placed = place_feeders(&skeleton, &[], candidates, count, &options, &monitor);
+            placed.expect("they feed").cost()
+        };
+        let all: Vec<u32> = (0..16).collect();
+        let (two, three) = (cost(&all, 2), cost(&all, 3));
+        for a in 0..16 {
+            for b in 0..a {
+                assert!(two <= cost(&[a, b], 2) * (1.0 + 1e-9), "{seed}: {a} {b}");
+                for c in 0..b {
+                    assert!(
+                        three <= cost(&[a, b, c], 3) * (1.0 + 1e-9),
+                        "{seed}: {a} {b} {c}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn the_growth_factors_agree() {
     for (area, slope) in [(1.05, 0.0122), (1.1, 0.0238), (1.2, 0.0455), (1.5, 0.1010)] {
         let options = FeedOptions {

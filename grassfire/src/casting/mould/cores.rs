@@ -1,7 +1,8 @@
 //! Undercuts that cores make, which a repair leaves open.
 
-use super::MouldError;
+use super::{MouldError, STAGE};
 use crate::Vec3;
+use crate::monitor::Monitor;
 use crate::remesh::Capsule;
 use crate::voxel::VoxelGrid;
 
@@ -11,14 +12,17 @@ const NEAR: f64 = 3.0;
 /// The empty voxels that cores fill: the undercuts at `places`, and what is undercut in `bores`.
 ///
 /// 1. Undercut is what is empty and has material below and above it on its line along z.
-/// 2. From the undercut voxel nearest to each place everything that is connected to it by faces is one core.
+/// 2. From the undercut voxel nearest to each place everything that is connected to it by faces is one core. With `may_close`
+///    a place away from all undercuts has none, which is told.
 ///
 /// # Errors
-/// [`MouldError::Place`] for a place away from all undercuts.
+/// [`MouldError::Place`] for such a place otherwise.
 pub(super) fn cored(
     field: &VoxelGrid<f32>,
     places: &[Vec3],
     bores: &[Capsule],
+    may_close: bool,
+    monitor: &Monitor,
 ) -> Result<Vec<bool>, MouldError> {
     let mut out = vec![false; field.values.len()];
     if places.is_empty() && bores.is_empty() {
@@ -26,8 +30,13 @@ pub(super) fn cored(
     }
     let undercut = undercut(field);
     for place in places {
-        let start = nearest(field, &undercut, place, "cores")?;
-        flood(field, &undercut, start, &mut out);
+        match nearest(field, &undercut, place, "cores") {
+            Ok(start) => flood(field, &undercut, start, &mut out),
+            Err(error) if may_close => {
+                monitor.warn(STAGE, format!("{error}: nothing is left open there"))
+            }
+            Err(error) => return Err(error),
+        }
     }
     for (v, core) in out.iter_mut().enumerate().filter(|(v, _)| undercut[*v]) {
         let [i, j, k] = field.ijk(v);

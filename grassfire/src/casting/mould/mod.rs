@@ -120,6 +120,7 @@ impl MouldOptions {
             parting,
             cell,
             cores: self.cores.iter().map(|p| Vec3::from(*p)).collect(),
+            cores_may_close: false,
             bores: Vec::new(),
             removals: self.removals.iter().map(|p| Vec3::from(*p)).collect(),
             min_gap: self.min_gap,

@@ -63,6 +63,8 @@ pub struct RepairOptions {
     pub cell: f64,
     /// A place in each undercut that a core makes, mm: it stays open.
     pub cores: Vec<Vec3>,
+    /// Such an undercut may have closed since its place was named: that is told, not refused.
+    pub cores_may_close: bool,
     /// Bores that cores make likewise.
     pub bores: Vec<Capsule>,
     /// A place in each undercut whose lesser side is taken away, mm.
@@ -182,7 +184,7 @@ pub(super) fn laid(
     let part = turn(mesh, |p| into(p, &frame));
     let remeshed = remesh(&part, &grid(cell), monitor).map_err(|source| refused(source, cell))?;
     let (mut field, volume) = (remeshed.field, remeshed.solid.volume());
-    let open = fill_cores(&mut field, options, &frame)?;
+    let open = fill_cores(&mut field, options, &frame, monitor)?;
     Ok(Laid {
         frame,
         field,
@@ -223,6 +225,7 @@ fn fill_cores(
     field: &mut VoxelGrid<f32>,
     options: &RepairOptions,
     frame: &[Vec3; 3],
+    monitor: &Monitor,
 ) -> Result<Vec<(usize, f32)>, MouldError> {
     let along = |bore: &Capsule| Capsule {
         a: into(&bore.a, frame),
@@ -230,7 +233,8 @@ fn fill_cores(
         ..*bore
     };
     let bores: Vec<Capsule> = options.bores.iter().map(along).collect();
-    let cores = cored(field, &turned(&options.cores, frame), &bores)?;
+    let places = turned(&options.cores, frame);
+    let cores = cored(field, &places, &bores, options.cores_may_close, monitor)?;
     let within = (0..cores.len()).filter(|&v| cores[v]);
     let open: Vec<(usize, f32)> = within.map(|v| (v, field.values[v])).collect();
     for (v, _) in &open {

@@ -228,6 +228,14 @@ fn a_core_keeps_its_undercut_open() {
     assert!(
         matches!(refused, Err(MouldError::Place { list: "cores", distance }) if distance > 60.0)
     );
+    // Once sections have grown the undercut of a core may be gone.
+    let grown = RepairOptions {
+        cores_may_close: true,
+        ..nowhere.repair_options(15.0, 1.0)
+    };
+    let monitor = Monitor::default();
+    let filled = repair(&mesh, &Vec3::z(), &grown, &monitor).expect("it is told");
+    assert_eq!((filled.multiple[1], monitor.warnings().len()), (0, 1));
 }
 
 /// A box section along x, 60 mm long: 40 wide and 30 high outside, its upper flange 6 mm and all else 4 mm thick.

@@ -5,11 +5,18 @@ use crate::Vec3;
 use crate::mesh::{Bvh, TriMesh};
 use crate::voxel::VoxelGrid;
 
+/// A feeder is rammed down to a surface that is not flat, or was pointed at from above, by this share of its diameter: as
+/// deep as a neck is high.
+const FOOT: f64 = 0.2;
+
 pub(super) fn up(options: &SolidifyOptions) -> Vec3 {
     Vec3::from(options.up).normalize()
 }
 
 /// Adds the feeders to the distances; gives their feet and diameters.
+///
+/// A feeder is a cylinder as high as it is wide. Below its foot there is metal, too, wherever the part follows within [`FOOT`]: a
+/// foot on a boss that is lower than the wall beside it would hang in the air otherwise, and feed nothing.
 pub(super) fn add_feeders(
     field: &mut VoxelGrid<f32>,
     mesh: &TriMesh,
@@ -45,17 +52,33 @@ pub(super) fn add_feeders(
         return Ok(feeders);
     }
     *field = roomy(field, &feeders, &up);
+    let part = field.clone();
     for v in 0..field.values.len() {
         let [i, j, k] = field.ijk(v);
         let p = field.centre(i, j, k);
         let depth = feeders
             .iter()
-            .map(|f| cylinder(&p, f, &up))
+            .map(|f| cylinder(&p, f, &up).max(below(&p, f, &up, &part)))
             .fold(f64::NEG_INFINITY, f64::max);
         let value = f64::from(field.values[v]);
         field.values[v] = value.max(depth.max(-4.0 * field.spacing)) as f32;
     }
     Ok(feeders)
+}
+
+/// Depth in the metal between a foot and the part below it; negative infinity where the part does not follow.
+fn below(p: &Vec3, feeder: &(Vec3, f64), up: &Vec3, part: &VoxelGrid<f32>) -> f64 {
+    let (foot, diameter) = feeder;
+    let along = (p - foot).dot(up);
+    let radial = (p - foot - along * up).norm();
+    let (inside, left) = (diameter / 2.0 - radial, FOOT * diameter + along);
+    if along >= 0.0 || inside <= 0.0 || left <= 0.0 {
+        return f64::NEG_INFINITY;
+    }
+    let step = part.spacing / 2.0;
+    let steps = (left / step) as usize;
+    let hits = (0..=steps).any(|n| part.sample(&(p - n as f64 * step * up)) > 0.0);
+    if hits { inside } else { f64::NEG_INFINITY }
 }
 
 /// The field on a grid that holds the feeders, too.
@@ -82,13 +105,18 @@ fn roomy(field: &VoxelGrid<f32>, feeders: &[(Vec3, f64)], up: &Vec3) -> VoxelGri
     out
 }
 
-/// Depth in a feeder: a cylinder from half a diameter below its foot (inside the part) to one above.
+/// Depth in a feeder: a cylinder from its foot to one diameter above.
 fn cylinder(p: &Vec3, (foot, diameter): &(Vec3, f64), up: &Vec3) -> f64 {
     let along = (p - foot).dot(up);
     let radial = (p - foot - along * up).norm();
     (diameter / 2.0 - radial).min(diameter - along).min(along)
 }
 
-pub(super) fn in_feeder(p: &Vec3, feeder: &(Vec3, f64), up: &Vec3) -> bool {
-    cylinder(p, feeder, up) > 0.0
+/// Whether a point lies in a feeder or in reach below its foot.
+pub(super) fn in_feeder(p: &Vec3, (foot, diameter): &(Vec3, f64), up: &Vec3) -> bool {
+    let reach = FOOT * diameter;
+    let (foot, height) = (foot - reach * up, diameter + reach);
+    let along = (p - foot).dot(up);
+    let radial = (p - foot - along * up).norm();
+    radial < diameter / 2.0 && along > 0.0 && along < height
 }

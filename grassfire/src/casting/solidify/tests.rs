@@ -235,16 +235,32 @@ fn cylinders_and_balls_freeze_as_fine_shells_do() {
     for metal in [aluminium(), steel()] {
         for (power, r) in [(0, 0.005), (1, 0.010), (2, 0.015)] {
             let exact = radial(power, r, &metal, &plain_sand());
-            let (time, drift) = on_cells(power, r, 12.0, &metal);
-            let off = time / exact - 1.0;
-            assert!(
-                off.abs() < 0.02,
-                "{} power {power}: {:.2} %",
-                metal.latent_heat,
-                100.0 * off
-            );
-            assert!(drift.abs() < 1e-9, "{drift:.1e}");
+            for (per_radius, allowed) in [(6.0, 0.05), (12.0, 0.02)] {
+                let (time, drift) = on_cells(power, r, per_radius, &metal);
+                let off = time / exact - 1.0;
+                assert!(
+                    off.abs() < allowed,
+                    "{} power {power}, {per_radius} cells: {:.2} %",
+                    metal.latent_heat,
+                    100.0 * off
+                );
+                assert!(drift.abs() < 1e-9, "{drift:.1e}");
+            }
         }
+    }
+}
+
+/// `t = C M^2 + b M`: the second term is the resistance between metal and mould.
+#[test]
+fn plates_freeze_by_chvorinov_with_a_linear_term() {
+    let metal = aluminium();
+    let time = |modulus: f64| on_cells(0, modulus * 1e-3, 24.0, &metal).0;
+    let (thin, thick) = (time(5.0) / 5.0, time(10.0) / 10.0);
+    let c = (thick - thin) / 5.0;
+    let b = thin - 5.0 * c;
+    for modulus in [6.0, 7.5, 9.0] {
+        let off = time(modulus) / (c * modulus * modulus + b * modulus) - 1.0;
+        assert!(off.abs() < 0.01, "{modulus} mm: {:.2} %", 100.0 * off);
     }
 }
 
@@ -296,6 +312,52 @@ fn a_plate_with_two_bosses_freezes_last_in_them() {
         fed.directional
     );
     assert!(fed.isolated_volume < alone.isolated_volume);
+}
+
+#[test]
+fn a_step_wedge_freezes_towards_its_thick_end() {
+    // Where a step begins, and how high it is; the last one is long, so that its end does not cool all of it.
+    let steps = [[0.0, 8.0], [24.0, 12.0], [48.0, 16.0], [72.0, 20.0]];
+    let ends = [24.0, 48.0, 72.0, 132.0];
+    let wedge = |([x, height], end): (&[f64; 2], &f64)| [*x, 0.0, 0.0, *end, 40.0, *height];
+    let mesh = boxes(&steps.iter().zip(&ends).map(wedge).collect::<Vec<_>>());
+    let options = SolidifyOptions {
+        cell: Some(2.5),
+        steps: 40,
+        ..SolidifyOptions::default()
+    };
+    let found = solidify(&mesh, &options, &Monitor::default()).expect("it freezes");
+    assert_eq!(found.hot_spots.len(), 1, "{:?}", found.places);
+    let last = found.places[0];
+    assert!(last.x > 74.0 && (last.y - 20.0).abs() < 4.0, "{last:?}");
+    let middles = steps.iter().zip(&ends);
+    let times = middles.map(|([x, height], end)| {
+        let middle = Vec3::new((x + end) / 2.0, 20.0, height / 2.0);
+        found.time.sample(&middle)
+    });
+    let times: Vec<f64> = times.collect();
+    assert!(times.windows(2).all(|t| t[0] < t[1]), "{times:?}");
+}
+
+/// A foot that was pointed at from above hung in the air beside a higher wall, and the feeder fed nothing.
+#[test]
+fn a_feeder_stands_on_what_is_below_its_foot() {
+    let mesh = boxes(&[[0.0, 0.0, 0.0, 60.0, 60.0, 10.0]]);
+    let run = |height: f64| {
+        let options = SolidifyOptions {
+            cell: Some(2.0),
+            steps: 40,
+            feeders: vec![[30.0, 30.0, height]],
+            feeder_diameter: 40.0,
+            ..SolidifyOptions::default()
+        };
+        solidify(&mesh, &options, &Monitor::default()).expect("it freezes")
+    };
+    let fed = run(13.0);
+    assert!(fed.directional > 0.9, "{}", fed.directional);
+    assert_eq!(fed.isolated_volume, 0.0);
+    // Out of its reach.
+    assert_eq!(run(19.5).directional, 0.0);
 }
 
 #[test]
