@@ -146,23 +146,9 @@ fn left(folder: &Path, names: &[&str]) -> Option<PathBuf> {
 /// `grassfire faces`: a line for every face.
 pub fn faces(file: &Path) -> Result<String, Failure> {
     let (_, faces) = step_faces(file).map_err(refused)?;
-    // No "-0.0000".
-    let rounded = |v: f64| (1e4 * v).round() / 1e4 + 0.0;
-    let vector = |v: [f64; 3]| {
-        let [x, y, z] = v.map(rounded);
-        format!("[{x:.4}, {y:.4}, {z:.4}]")
-    };
     let mut text = String::new();
     for (i, face) in faces.iter().enumerate() {
-        let like = &face.like;
-        text += &format!(
-            "{:4} {:8} {{ area = {:.4}, middle = {}, normal = {} }}",
-            i + 1,
-            face.surface,
-            like.area,
-            vector(like.middle),
-            vector(like.normal)
-        );
+        text += &format!("{:4} {:8} {}", i + 1, face.surface, face.like);
         if !face.name.is_empty() {
             text += &format!(" name {:?}", face.name);
         }

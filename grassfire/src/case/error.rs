@@ -45,12 +45,12 @@ pub enum CaseError {
     },
     #[error("{key}: {path} is a STEP file and this build has no OpenCASCADE")]
     NoKernel { key: String, path: String },
-    #[error("{key}: {path} has no face like {wanted}; nearest: {nearest}")]
+    #[error("{key}: {path} has no face like {wanted}, but {there}")]
     NoFace {
         key: String,
         path: String,
         wanted: String,
-        nearest: String,
+        there: String,
     },
     #[error("the selection {name:?} holds no node of the grid")]
     EmptySelection { name: String },

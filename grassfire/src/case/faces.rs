@@ -1,5 +1,6 @@
 //! Faces of a STEP file as places for supports and loads.
 
+use std::fmt;
 use std::path::Path;
 
 use schemars::JsonSchema;
@@ -24,6 +25,24 @@ pub struct FaceLike {
     pub middle: [f64; 3],
     /// Mean outward normal; zero all around a bore.
     pub normal: [f64; 3],
+}
+
+/// As it stands in a project file.
+impl fmt::Display for FaceLike {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        // No "-0.0000".
+        let rounded = |v: f64| (1e4 * v).round() / 1e4 + 0.0;
+        let vector = |v: [f64; 3]| {
+            let [x, y, z] = v.map(rounded);
+            format!("[{x:.4}, {y:.4}, {z:.4}]")
+        };
+        let (middle, normal) = (vector(self.middle), vector(self.normal));
+        write!(
+            f,
+            "{{ area = {:.4}, middle = {middle}, normal = {normal} }}",
+            self.area
+        )
+    }
 }
 
 /// A face of a STEP file.
@@ -128,12 +147,12 @@ pub(super) fn chosen(path: &Path, key: &str, wanted: Wanted) -> Result<TriMesh, 
         match best {
             Some((i, off)) if off <= SAME => held[i] = true,
             best => {
-                let nearest = best.map(|(i, _)| faces[i].like.clone()).unwrap_or_default();
+                let nearest = best.map(|(i, _)| faces[i].like.to_string());
                 return Err(CaseError::NoFace {
                     key: key.to_owned(),
                     path: path.display().to_string(),
-                    wanted: format!("{like:?}"),
-                    nearest: format!("{nearest:?}"),
+                    wanted: like.to_string(),
+                    there: nearest.unwrap_or_default(),
                 });
             }
         }
@@ -156,8 +175,16 @@ pub(super) fn chosen(path: &Path, key: &str, wanted: Wanted) -> Result<TriMesh, 
         return Err(CaseError::NoFace {
             key: key.to_owned(),
             path: path.display().to_string(),
-            wanted: format!("{wanted:?}"),
-            nearest: names.join(", "),
+            wanted: [wanted.name, wanted.colour]
+                .into_iter()
+                .flatten()
+                .collect::<Vec<_>>()
+                .join(" or "),
+            there: if names.is_empty() {
+                "none of its faces has a name".to_owned()
+            } else {
+                names.join(", ")
+            },
         });
     }
     let tags = std::mem::take(&mut mesh.tags);

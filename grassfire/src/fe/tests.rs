@@ -280,18 +280,23 @@ fn sprung(stiffness: impl Fn([usize; 3]) -> Matrix3<f64>, pull: [f64; 3]) -> Vox
     model
 }
 
-#[test]
-fn a_bar_on_springs_moves_by_their_give_and_its_own() {
-    // 20 mm long, 16 mm2, E = 1: it gives way by 20 / 16, the springs by 1 / 0.05.
-    let model = sprung(|_| Matrix3::identity() * 0.05, [1.0, 0.0, 0.0]);
-    assert!(free_modes(&model.fixed, &model.springs).is_empty());
+fn solved(model: VoxelModel, tolerance: f64) -> (Solver, SolveStats) {
     let options = SolverOptions {
-        tolerance: 1e-10,
+        tolerance,
         coarsest: 600,
         ..SolverOptions::default()
     };
     let mut solver = Solver::new(model, &[1.0; 40 * 64], &options).unwrap();
     let stats = solver.solve(0, &Monitor::default()).unwrap();
+    (solver, stats)
+}
+
+#[test]
+fn a_bar_on_springs_moves_by_their_give_and_its_own() {
+    // 20 mm long, 16 mm2, E = 1: it gives way by 20 / 16, the springs by 1 / 0.05.
+    let model = sprung(|_| Matrix3::identity() * 0.05, [1.0, 0.0, 0.0]);
+    assert!(free_modes(&model.fixed, &model.springs).is_empty());
+    let (solver, stats) = solved(model, 1e-10);
     assert!(stats.iterations <= 30, "{stats:?}");
     let u = solver.displacement([40, 3, 5]);
     assert!((u[0] - 21.25).abs() < 1e-6 && u[1].abs() < 1e-6, "{u:?}");
@@ -310,14 +315,7 @@ fn stiff_springs_along_a_slanting_normal_do_not_slow_the_solver_down() {
     assert_eq!(slides.len(), 3, "{slides:?}");
     model.fixed = vec![([0, 4, 4], 1), ([0, 4, 4], 2), ([0, 8, 4], 2)];
     assert!(free_modes(&model.fixed, &model.springs).is_empty());
-    let options = SolverOptions {
-        tolerance: 1e-8,
-        coarsest: 600,
-        ..SolverOptions::default()
-    };
-    let mut solver = Solver::new(model, &[1.0; 40 * 64], &options).unwrap();
-    let stats = solver.solve(0, &Monitor::default()).unwrap();
-    println!("{stats:?}");
+    let (solver, stats) = solved(model, 1e-8);
     assert!(stats.iterations <= 40, "{stats:?}");
     for (y, z) in (0..81).map(|i| (i % 9, i / 9)) {
         let u = Vector3::from(solver.displacement([0, y, z]));
@@ -331,14 +329,7 @@ fn a_part_on_springs_far_softer_than_itself_converges() {
     // The springs give way a million times as much as the bar: single precision alone cannot tell them from nothing.
     for (soft, along) in [(1e-6, [1.0, 0.0, 0.0]), (1e-6, [0.0, 0.3, -1.0])] {
         let model = sprung(|_| Matrix3::identity() * soft, along);
-        let options = SolverOptions {
-            tolerance: 1e-6,
-            coarsest: 600,
-            ..SolverOptions::default()
-        };
-        let mut solver = Solver::new(model, &[1.0; 40 * 64], &options).unwrap();
-        let stats = solver.solve(0, &Monitor::default()).unwrap();
-        println!("{stats:?}");
+        let (solver, stats) = solved(model, 1e-6);
         assert!(stats.iterations <= 40, "{stats:?}");
         let reactions = solver.reactions();
         for (found, load) in reactions.iter().zip(along) {
