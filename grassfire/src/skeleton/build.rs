@@ -307,8 +307,9 @@ fn bend_beams(c: &mut Complex, reference: &Reference, unit: f64) {
         let beams: Vec<[u32; 2]> = c.alive_beams().collect();
         let mut split = false;
         for [a, b] in beams {
-            let middle = (c.points[a as usize] + c.points[b as usize]) / 2.0;
-            let Some((x, r)) = reference.on_arc(&middle, Class::Beam) else {
+            let ends = [a, b].map(|v| c.points[v as usize]);
+            let middle = (ends[0] + ends[1]) / 2.0;
+            let Some((x, r)) = reference.on_arc(&middle, Class::Beam, &ends) else {
                 continue;
             };
             let (sagitta, length) = ((x - middle).norm(), c.length(a, b));

@@ -89,8 +89,9 @@ fn split_long(c: &mut Complex, reference: &Reference, sizing: &Sizing) {
     edges.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
     for (l, [a, b]) in edges {
         if l > 4.0 / 3.0 * sizing.edge(c, a, b) && c.connected(a, b) {
+            let ends = [a, b].map(|v| c.points[v as usize]);
             let m = c.split_middle(a, b);
-            reference.project(c, m);
+            reference.project(c, m, &ends);
         }
     }
 }
@@ -233,7 +234,7 @@ fn flip(c: &mut Complex, a: u32, b: u32) {
 }
 
 fn relax(c: &mut Complex, reference: &Reference) {
-    let mut moved: Vec<(u32, Vec3)> = Vec::new();
+    let mut moved: Vec<(u32, Vec3, Vec3)> = Vec::new();
     for v in c.vertices() {
         let around: Vec<u32> = match c.class(v) {
             Class::Corner => continue,
@@ -251,12 +252,13 @@ fn relax(c: &mut Complex, reference: &Reference) {
         };
         let mean =
             around.iter().map(|&w| c.points[w as usize]).sum::<Vec3>() / around.len().max(1) as f64;
-        moved.push((v, c.points[v as usize] * 0.4 + mean * 0.6));
+        let from = c.points[v as usize];
+        moved.push((v, from, from * 0.4 + mean * 0.6));
     }
-    for &(v, x) in &moved {
+    for &(v, _, x) in &moved {
         c.points[v as usize] = x;
     }
-    for &(v, _) in &moved {
-        reference.project(c, v);
+    for &(v, from, _) in &moved {
+        reference.project(c, v, &[from]);
     }
 }

@@ -18,8 +18,9 @@ pub(crate) fn make_even(
     target: impl Fn(&Complex, u32, u32) -> f64,
 ) -> bool {
     let split = |c: &mut Complex, [a, b]: [u32; 2]| {
+        let ends = [a, b].map(|v| c.points[v as usize]);
         let m = c.split_middle(a, b);
-        reference.project(c, m);
+        reference.project(c, m, &ends);
     };
     for arc in super::arcs::trace(c).arcs {
         if arc.kind == super::arcs::ArcKind::Seam && arc.vertices.len() == 2 {
@@ -206,10 +207,11 @@ pub(crate) fn split_rims(
         }
         let v = p.corners();
         let (a, b, apex) = (v[k], v[(k + 1) % 3], v[(k + 2) % 3]);
-        let middle = (points[a as usize] + points[b as usize]) / 2.0;
+        let ends = [points[a as usize], points[b as usize]];
+        let middle = (ends[0] + ends[1]) / 2.0;
         let radius = (radii[a as usize] + radii[b as usize]) / 2.0;
         let (x, r) = reference
-            .on_arc(&middle, Class::Rim)
+            .on_arc(&middle, Class::Rim, &ends)
             .unwrap_or((middle, radius));
         let far = (points[a as usize] - points[b as usize]).norm();
         let m = points.len() as u32;

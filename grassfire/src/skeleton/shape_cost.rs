@@ -100,7 +100,7 @@ pub(crate) fn settle(m: &mut QuadMesh, reference: &Reference, rounds: usize) {
             let found = if class == Class::Interior {
                 reference.on_sheet(&target, |_| true)
             } else {
-                reference.on_arc(&target, Class::Rim)
+                reference.on_arc(&target, Class::Rim, &[x])
             };
             let reach = ends
                 .iter()

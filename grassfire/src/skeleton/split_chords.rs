@@ -114,25 +114,23 @@ impl Splitter<'_> {
     /// The ends of a side with its new vertices between them.
     fn side(&mut self, [a, b]: [u32; 2], class: Class, n: usize) -> Vec<u32> {
         let [i, j] = [a as usize, b as usize];
-        let (d, dr) = (
-            self.points[j] - self.points[i],
-            self.radii[j] - self.radii[i],
-        );
+        let ends = [self.points[i], self.points[j]];
+        let (d, dr) = (ends[1] - ends[0], self.radii[j] - self.radii[i]);
         let mut out = vec![a];
         for k in 1..n {
             let t = k as f64 / n as f64;
             let (x, r) = (self.points[i] + d * t, self.radii[i] + dr * t);
-            out.push(self.add(x, r, class, REACH * d.norm()));
+            out.push(self.add(x, r, class, REACH * d.norm(), &ends));
         }
         out.push(b);
         out
     }
 
     /// A new vertex, on what the class says where that is near.
-    fn add(&mut self, x: Vec3, r: f64, class: Class, reach: f64) -> u32 {
+    fn add(&mut self, x: Vec3, r: f64, class: Class, reach: f64, ends: &[Vec3]) -> u32 {
         let found = match class {
             Class::Interior => self.reference.on_sheet(&x, |_| true),
-            _ => self.reference.on_arc(&x, class),
+            _ => self.reference.on_arc(&x, class, ends),
         };
         let (x, r) = found
             .filter(|(y, _)| (y - x).norm() <= reach)
@@ -177,7 +175,7 @@ impl Splitter<'_> {
             );
         let r = (self.radii[left[j] as usize] + self.radii[right[j] as usize]) / 2.0;
         let reach = REACH * (p(left[j]) - p(right[j])).norm();
-        self.add(x, r, Class::Interior, reach)
+        self.add(x, r, Class::Interior, reach, &[])
     }
 }
 

@@ -45,7 +45,7 @@ pub(crate) fn square_up(
             let x = points[v] * 0.3 + x * (0.7 / n);
             let found = match class[v] {
                 Class::Interior => reference.on_sheet(&x, |_| true),
-                Class::Rim | Class::Seam => reference.on_arc(&x, class[v]),
+                Class::Rim | Class::Seam => reference.on_arc(&x, class[v], &[points[v]]),
                 Class::Beam | Class::Corner => None,
             };
             // The nearest fine rim may be another one: then the vertex waits.
