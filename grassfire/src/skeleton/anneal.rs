@@ -290,7 +290,7 @@ mod tests {
             .collect();
         let radii = vec![0.5; points.len()];
         let c = Complex::new(points, radii, &triangles, &[]);
-        Reference::new(&c, &arcs::trace(&c), 0.1)
+        Reference::new(&c, &arcs::trace(&c), 0.1, true)
     }
 
     /// A square plate of unit quads.

@@ -189,7 +189,9 @@ pub fn quad_skeleton(
     let traced = arcs::trace(&c);
     let table = c.edge_table();
     c.label_sheets(&table);
-    let reference = Reference::new(&c, &traced, 0.2 * unit);
+    // The plain layout stays as it was: it is what parts fall back to, and on bulky ones the nearest arc does better.
+    let own_arcs = options.layout == Layout::Regular;
+    let reference = Reference::new(&c, &traced, 0.2 * unit, own_arcs);
     let sizing = sizing(options, median, spacing);
     coarsen(&mut c, &reference, &sizing, unit, monitor)?;
     bend_beams(&mut c, &reference, unit);

@@ -53,11 +53,12 @@ pub(crate) struct Reference {
     arcs: [Samples; 3],
     /// Distance of the samples on arcs, mm.
     step: f64,
+    own_arcs: bool,
 }
 
 impl Reference {
-    /// Samples `c` (sheets labelled, arcs traced); arcs every `step`.
-    pub fn new(c: &Complex, arcs: &Arcs, step: f64) -> Self {
+    /// Samples `c` (sheets labelled, arcs traced); arcs every `step`. `own_arcs`: vertices on arcs keep to their own.
+    pub fn new(c: &Complex, arcs: &Arcs, step: f64, own_arcs: bool) -> Self {
         let (mut points, mut radii, mut sheets) = (Vec::new(), Vec::new(), Vec::new());
         let mut seen = vec![false; c.points.len()];
         for t in c.alive() {
@@ -85,6 +86,7 @@ impl Reference {
             sheet,
             arcs: [arc(ArcKind::Rim), arc(ArcKind::Seam), arc(ArcKind::Beam)],
             step,
+            own_arcs,
         }
     }
 
@@ -117,7 +119,7 @@ impl Reference {
 
     /// Puts a point onto the rim, seam or beam that it came along: `from` holds where a vertex was, or the two ends of the side
     /// that it divides. The nearest arc is another one where a sheet is narrow, above all at its tips. Without such places, or
-    /// when they lie on no arc, or on none together, the nearest one is taken.
+    /// when they lie on no arc, or on none together, or vertices need not keep to their own, the nearest one is taken.
     pub fn on_arc(&self, x: &Vec3, class: Class, from: &[Vec3]) -> Option<(Vec3, f64)> {
         let samples = match class {
             Class::Rim => &self.arcs[0],
@@ -127,6 +129,7 @@ impl Reference {
         };
         let anchors: Vec<(Vec<u32>, f64)> = from
             .iter()
+            .filter(|_| self.own_arcs)
             .map(|p| {
                 let reach = DETOUR * (x - p).norm() + self.step;
                 (samples.places(p, 0.5 * self.step), reach)
@@ -213,7 +216,7 @@ mod tests {
             .collect();
         let radii = vec![1.0; points.len()];
         let c = Complex::new(points, radii, &triangles, &[]);
-        Reference::new(&c, &arcs::trace(&c), 0.05)
+        Reference::new(&c, &arcs::trace(&c), 0.05, true)
     }
 
     #[test]

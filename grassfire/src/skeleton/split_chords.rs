@@ -222,7 +222,7 @@ mod tests {
         let mut fine = Complex::new(points, radii, &triangles, &[]);
         let table = fine.edge_table();
         fine.label_sheets(&table);
-        let reference = Reference::new(&fine, &arcs::trace(&fine), 0.05);
+        let reference = Reference::new(&fine, &arcs::trace(&fine), 0.05, true);
         let (points, quads) = grid(2, 2, 2.0);
         let mut points = points;
         points.iter_mut().for_each(|p| p.y *= 1.5);
