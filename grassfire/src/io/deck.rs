@@ -9,9 +9,6 @@ use crate::Vec3;
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
 
-/// Sets may name sets that name sets, so often.
-const DEPTH: usize = 8;
-
 /// Reads the faces that a named set of a deck stands for, as triangles of corner nodes, mm.
 ///
 /// 1. `*NODE`, `*ELEMENT`, `*NSET`, `*ELSET` (both also with `GENERATE`) and `*SURFACE` are read, also sets that nodes and
@@ -189,14 +186,14 @@ impl Deck {
         };
         if let Some(surface) = self.surfaces.get(set) {
             for (member, face) in surface {
-                for number in self.numbers(&self.element_sets, member, DEPTH) {
+                for number in numbers(&self.element_sets, member) {
                     if let Some(e) = self.elements.get(&number) {
                         add(&mut corners(e, *face).into_iter())?;
                     }
                 }
             }
         } else if self.node_sets.contains_key(set) {
-            let held = self.numbers(&self.node_sets, &Member::Set(set.to_owned()), DEPTH);
+            let held = numbers(&self.node_sets, &Member::Set(set.to_owned()));
             let mut any = false;
             for e in self.elements.values() {
                 for face in (0..e.faces.len()).map(|f| corners(e, f)) {
@@ -210,7 +207,7 @@ impl Deck {
                 add(&mut std::iter::once(node))?;
             }
         } else if self.element_sets.contains_key(set) {
-            for number in self.numbers(&self.element_sets, &Member::Set(set.to_owned()), DEPTH) {
+            for number in numbers(&self.element_sets, &Member::Set(set.to_owned())) {
                 let Some(e) = self.elements.get(&number) else {
                     continue;
                 };
@@ -236,24 +233,24 @@ impl Deck {
         }
         Ok(mesh)
     }
+}
 
-    /// The numbers that a member of a set stands for.
-    fn numbers(
-        &self,
-        sets: &BTreeMap<String, Vec<Member>>,
-        member: &Member,
-        depth: usize,
-    ) -> BTreeSet<u32> {
+/// The numbers that a member of a set stands for. Each set counts once, however often sets name it.
+fn numbers(sets: &BTreeMap<String, Vec<Member>>, member: &Member) -> BTreeSet<u32> {
+    let (mut out, mut seen) = (BTreeSet::new(), BTreeSet::new());
+    let mut open = vec![member];
+    while let Some(member) = open.pop() {
         match member {
-            Member::Number(number) => BTreeSet::from([*number]),
-            Member::Set(_) if depth == 0 => BTreeSet::new(),
-            Member::Set(name) => {
-                let members = sets.get(name).map_or(&[][..], Vec::as_slice);
-                let each = members.iter().map(|m| self.numbers(sets, m, depth - 1));
-                each.flatten().collect()
+            Member::Number(number) => {
+                out.insert(*number);
             }
+            Member::Set(name) if seen.insert(name) => {
+                open.extend(sets.get(name).into_iter().flatten())
+            }
+            Member::Set(_) => {}
         }
     }
+    out
 }
 
 /// A keyword line; the values of its parameters in capitals.
@@ -441,6 +438,20 @@ Left, 1, 3
         // Two nodes of no face stand for themselves.
         let ends = read(DECK, "ends").unwrap();
         assert_eq!(ends.points, [Vec3::zeros(), Vec3::new(4.0, 2.0, 2.0)]);
+    }
+
+    #[test]
+    fn sets_that_name_each_other_a_thousand_times_are_read_at_once() {
+        // Read anew wherever they are named, these are 1000 to the power of seven sets.
+        let level = |k: usize| {
+            format!(
+                "*NSET, NSET=L{k}\n{}\n",
+                format!("L{},", k + 1).repeat(1000)
+            )
+        };
+        let levels: String = (0..7).map(level).collect();
+        let found = read(&format!("{DECK}{levels}*NSET, NSET=L7\nLeft\n"), "l0").unwrap();
+        assert!((found.area() - 4.0).abs() < 1e-12);
     }
 
     #[test]
