@@ -388,7 +388,7 @@ fn rebuild(
 
     feeding::prove(record, &original, &part.mesh, options, monitor)?;
     casting::mould_of(record, &part.mesh, &options.mould, monitor)?;
-    let pictures = record.stage("pictures", || {
+    let mut pictures = record.stage("pictures", || {
         let stages = illustrate::Stages {
             remeshed,
             poles: &poles,
@@ -399,6 +399,10 @@ fn rebuild(
         };
         illustrate::pictures(&stages, &options.report, monitor)
     })?;
+    let places = casting::sheet_places(record);
+    pictures.extend(record.stage("pictures", || {
+        casting::sheet_pictures(&places, &part.mesh, &options.report)
+    })?);
     Ok(Rebuilt {
         delivery,
         pictures,

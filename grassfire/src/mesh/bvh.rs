@@ -116,6 +116,16 @@ impl Bvh {
     /// The nearest point of the mesh no farther than `max` (mm; infinity is allowed) from `p`.
     /// Among equally near triangles the one met first in the tree wins, which is the same in every run.
     pub fn nearest(&self, p: &Vec3, max: f64) -> Option<Nearest> {
+        self.nearest_where(p, max, |_, _| true)
+    }
+
+    /// As [`Bvh::nearest`], of those triangles only whose index and point nearest to `p` please `keep`.
+    pub fn nearest_where(
+        &self,
+        p: &Vec3,
+        max: f64,
+        keep: impl Fn(u32, &Vec3) -> bool,
+    ) -> Option<Nearest> {
         let mut best = None;
         let mut limit = max * max;
         let mut stack = [(0u32, 0.0f64); STACK];
@@ -135,7 +145,9 @@ impl Bvh {
                 for t in node.first..node.first + node.count {
                     let q = nearest_on_triangle(p, &self.corners[t as usize]);
                     let d = (q - p).norm_squared();
-                    if d < limit || (d <= limit && best.is_none()) {
+                    if (d < limit || (d <= limit && best.is_none()))
+                        && keep(self.ids[t as usize], &q)
+                    {
                         limit = d;
                         best = Some((q, t));
                     }

@@ -7,12 +7,14 @@ pub mod self_intersection;
 #[cfg(test)]
 pub(crate) mod shapes;
 mod solid;
+mod tangent_ball;
 pub mod winding;
 
 pub use bvh::{Bvh, Nearest};
 pub use distance::{Distance, DistanceOptions, DistanceSummary, two_sided};
 pub use repair::{Repair, RepairError, RepairKind, RepairOptions, RepairReport, Repaired, repair};
 pub use solid::{Solid, SolidError};
+pub use tangent_ball::{TangentBall, TangentBalls};
 pub use winding::Winding;
 
 use crate::Vec3;

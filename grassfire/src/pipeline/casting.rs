@@ -16,10 +16,11 @@ use crate::io::{self, Input};
 use crate::mesh::{TriMesh, repair};
 use crate::monitor::Monitor;
 use crate::remesh::{RemeshOptions, Remeshed, remesh};
+use crate::report::render::findings::findings;
 use crate::report::render::{ColourMap, Legend, section::Section, section::section};
 use crate::report::{
-    FindingBlock, HotSpotBlock, MouldBlock, Picture, ReportError, ReportOptions, SolidifyBlock,
-    UndercutBlock,
+    FeedBlock, FindingBlock, HotSpotBlock, MouldBlock, Picture, ReportError, ReportOptions,
+    SolidifyBlock, UndercutBlock,
 };
 use crate::voxel::VoxelGrid;
 
@@ -109,9 +110,13 @@ pub fn mould_solid(job: &SolidJob, monitor: &Monitor) -> Result<Outcome, Pipelin
         record.stage("write", || delivery.stl("repaired.stl", &repaired.mesh))?;
     }
     record.report.mould = Some(mould_block(&found));
+    let places = sheet_places(&record);
+    let pictures = record.stage("pictures", || {
+        sheet_pictures(&places, &mesh, &options.report)
+    })?;
     let failed_checks = record.finish(&options.report.limits, monitor);
     delivery
-        .report(&mut record.report, &[])
+        .report(&mut record.report, &pictures)
         .map_err(|source| PipelineError {
             stage: "report",
             source,
@@ -218,13 +223,47 @@ pub(super) fn mould_of(
     };
     let found = record.stage("mould", || mould(part, &options, monitor))?;
     let before = record.report.mould.take().unwrap_or_default();
+    let mut block = mould_block(&found);
+    if let Some(feed) = &record.report.feed {
+        block.findings.extend(feeding_distances(feed));
+    }
     record.report.mould = Some(MouldBlock {
         repaired_volume: before.repaired_volume,
         multiple_lines_before: before.multiple_lines_before,
         multiple_lines: before.multiple_lines,
-        ..mould_block(&found)
+        ..block
     });
     Ok(())
+}
+
+/// Feeders that stand too far from what they feed.
+fn feeding_distances(feed: &FeedBlock) -> impl Iterator<Item = FindingBlock> {
+    let far = feed.zones.iter().filter(|zone| zone.reach > zone.limit);
+    far.map(|zone| FindingBlock {
+        rule: "feeding_distance".to_owned(),
+        place: zone.place,
+        value: zone.reach,
+        limit: zone.limit,
+        source: "feed.feeding_distance thicknesses; in plates of steel 2 from the feeder and 2.5 from the end (classic rule)".to_owned(),
+    })
+}
+
+/// The places of the sheet's findings, mm.
+pub(super) fn sheet_places(record: &Record) -> Vec<Vec3> {
+    let found = record.report.mould.iter().flat_map(|b| &b.findings);
+    found.map(|f| f.place.into()).collect()
+}
+
+/// Pictures of the part with the places of the sheet's findings.
+pub(super) fn sheet_pictures(
+    places: &[Vec3],
+    mesh: &TriMesh,
+    options: &ReportOptions,
+) -> Result<Vec<Picture>, ReportError> {
+    if !options.pictures {
+        return Ok(Vec::new());
+    }
+    Ok(findings(mesh, places, options.picture_size())?)
 }
 
 fn mould_block(found: &Mould) -> MouldBlock {
@@ -252,6 +291,9 @@ fn mould_block(found: &Mould) -> MouldBlock {
         draft: found.draft.clone(),
         min_wall: found.min_wall,
         wall_ratio: found.wall_ratio,
+        transition: found.transition,
+        short_fillets: found.inner_edges.short,
+        junctions: found.junctions.clone(),
         findings: findings.collect(),
         repaired_volume: repaired.map(|r| r.volume[1]),
         multiple_lines_before: repaired.map(|r| r.multiple[0]),

@@ -8,7 +8,7 @@ use super::checks::{Check, DEFECTS, Limits, check};
 use super::format::{count, number, with_unit};
 use super::recognised::place;
 use crate::casting::feed::Monotony;
-use crate::casting::mould::DraftClass;
+use crate::casting::mould::{DraftClass, Junction};
 
 /// The feeding edit.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -133,6 +133,12 @@ pub struct MouldBlock {
     pub min_wall: Option<f64>,
     /// Thick over thin walls.
     pub wall_ratio: f64,
+    /// Change of a wall's thickness over the way along it that all but the exempt share of places have at most.
+    pub transition: f64,
+    /// Share of the surface that lies beside inner edges whose fillet is too small for the walls.
+    pub short_fillets: f64,
+    /// Junctions of walls, one of each kind.
+    pub junctions: Vec<Junction>,
     /// Rules that are not met.
     pub findings: Vec<FindingBlock>,
     /// Volume of the part, or of the proposal before its skeleton was made, when its undercuts were repaired, mm3.
@@ -316,15 +322,21 @@ fn mould(block: &MouldBlock) -> Markup {
             div { dt { "Least draft" } dd { (with_unit(block.min_draft, 3, "°")) } }
             @if let Some(wall) = block.min_wall { div { dt { "Least wall" } dd { (with_unit(wall, 3, "mm")) } } }
             div { dt { "Thick to thin walls" } dd { (number(block.wall_ratio, 3)) } }
+            div { dt { "Change of thickness over the way" } dd { (number(block.transition, 2)) } }
+            div { dt { "Surface beside inner edges with too small a fillet" } dd { (with_unit(100.0 * block.short_fillets, 3, "%")) } }
+            @for junction in &block.junctions {
+                div { dt { "Ball over wall, " (count(junction.places)) " places of kind " (format!("{:?}", junction.kind)) } dd { (number(junction.ratio, 3)) " at " (place(&junction.place.into())) } }
+            }
             @if let Some(volume) = block.repaired_volume { div { dt { "Volume when repaired" } dd { (with_unit(volume, 5, "mm³")) } } }
             @if let (Some(before), Some(after)) = (block.multiple_lines_before, block.multiple_lines) { div { dt { "Lines with hidden gaps, before and after the repair" } dd { (count(before)) ", " (count(after)) } } }
         }
         @if !block.findings.is_empty() {
             div .scroll { table {
-                thead { tr { th { "Finding" } th { "Place" } th .n { "Value" } th .n { "Limit" } th { "Source" } } }
+                thead { tr { th .n { "No." } th { "Finding" } th { "Place" } th .n { "Value" } th .n { "Limit" } th { "Source" } } }
                 tbody {
-                    @for finding in &block.findings {
+                    @for (at, finding) in block.findings.iter().enumerate() {
                         tr {
+                            td .n { (count(at + 1)) }
                             td { (finding.rule) }
                             td { (place(&finding.place)) }
                             td .n { (number(finding.value, 4)) }

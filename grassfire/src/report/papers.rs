@@ -46,6 +46,13 @@ pub const ALL: &[Paper] = &[
         used_for: "planes and cylinders in the proposal",
     },
     Paper {
+        key: "ma2012",
+        citation: "J. Ma, S. W. Bae, S. Choi (2012): 3D medial axis point approximation using nearest neighbors and the normal field. The Visual Computer 28(1).",
+        doi: "10.1007/s00371-011-0594-7",
+        stages: &["mould"],
+        used_for: "balls in walls and in the sand beside them: fillets, gaps, junctions",
+    },
+    Paper {
         key: "lorensen1987",
         citation: "W. E. Lorensen, H. E. Cline (1987): Marching cubes: a high resolution 3D surface construction algorithm. ACM SIGGRAPH Computer Graphics 21(4).",
         doi: "10.1145/37402.37422",

@@ -7,9 +7,12 @@ pub mod dexels;
 pub mod directions;
 pub mod draft;
 mod gaps;
+mod inner_edges;
+mod junctions;
 pub mod repair;
 mod rooms;
 pub mod rules;
+mod sheet;
 #[cfg(test)]
 mod tests;
 pub mod undercuts;
@@ -23,14 +26,16 @@ pub use conflicts::{Conflict, conflicts};
 pub use dexels::{Dexels, Lattice, dexels, dexels_on};
 pub use directions::{Direction, best_direction};
 pub use draft::DraftClass;
+pub use inner_edges::{InnerEdge, InnerEdges, inner_edges};
+pub use junctions::{Junction, JunctionKind, junctions};
 pub use repair::{Repair, RepairOptions, Repaired, repair};
 pub use rooms::{Room, rooms};
 pub use rules::{Alloy, Limit, Process, Rules};
 pub use undercuts::{Undercut, parting, undercuts};
-pub use walls::{Wall, walls};
+pub use walls::{Inscribed, Wall, inscribed, transitions, walls};
 
 use crate::Vec3;
-use crate::mesh::TriMesh;
+use crate::mesh::{TangentBalls, TriMesh};
 use crate::monitor::{Cancelled, Monitor};
 use crate::remesh::RemeshError;
 
@@ -166,6 +171,12 @@ pub struct Mould {
     pub min_wall: Option<f64>,
     /// Thick over thin walls: 95 % and 5 % of the places.
     pub wall_ratio: f64,
+    /// Change of thickness over the way along the wall: what all but the exempt share of places have, at most.
+    pub transition: f64,
+    /// Inner edges with too small a fillet, gaps and holes that are too narrow.
+    pub inner_edges: InnerEdges,
+    /// Junctions of walls, one of each kind.
+    pub junctions: Vec<Junction>,
     /// Rules that are not met.
     pub findings: Vec<Finding>,
     /// The part without undercuts, when asked for.
@@ -238,8 +249,9 @@ const CLASSES: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
 ///
 /// 1. The draw direction as given, or the best ([`best_direction`]).
 /// 2. Undercuts, parting line, draft, walls.
-/// 3. The foundry's rules; every finding has a place, a value, a limit and its source.
-/// 4. The repair, when asked for.
+/// 3. Fillets, gaps and holes ([`inner_edges()`]), steps of walls ([`transitions`]), junctions ([`junctions()`]).
+/// 4. The foundry's rules; every finding has a place, a value, a limit and its source.
+/// 5. The repair, when asked for.
 ///
 /// Lengths in mm, angles in degrees. Does not depend on the number of threads.
 ///
@@ -289,6 +301,10 @@ pub fn mould(
         (Some(thick), Some(thin)) => thick.thickness / thin.thickness,
         _ => 1.0,
     };
+    let balls = TangentBalls::new(mesh);
+    let inscribed = inscribed(mesh, &balls, options.wall_samples);
+    let steps = transitions(&balls, &inscribed);
+    let steep = steps.get((options.exempt * steps.len() as f64) as usize);
     let mut out = Mould {
         draw,
         direction: directions::judge(mesh, &draw, options.lines, wanted),
@@ -300,9 +316,22 @@ pub fn mould(
         draft: draft::draft_classes(mesh, &draw, &CLASSES),
         min_wall: pick(options.exempt).map(|wall| wall.thickness),
         wall_ratio: ratio,
+        transition: steep.map_or(0.0, |s| s.1),
+        inner_edges: inner_edges(
+            &balls,
+            &inscribed,
+            rules.rounding().value,
+            rules.hole().value,
+        ),
+        junctions: junctions(&balls, &inscribed),
         ..Mould::default()
     };
-    out.findings = findings(&out, mesh, pick(options.exempt), pick(0.95), rules);
+    let places = sheet::Places {
+        thin: pick(options.exempt),
+        thick: pick(0.95),
+        steep: steep.map(|s| s.0),
+    };
+    out.findings = sheet::findings(&out, mesh, &places, rules);
     if options.repairs() {
         monitor.step(STAGE, "repair", 0.8)?;
         let cell = options.cell.unwrap_or(lattice.pitch);
@@ -310,61 +339,6 @@ pub fn mould(
         out.repaired = Some(repair(mesh, &draw, &repair_options, monitor)?);
     }
     Ok(out)
-}
-
-fn findings(
-    mould: &Mould,
-    mesh: &TriMesh,
-    thin: Option<&Wall>,
-    thick: Option<&Wall>,
-    rules: &Rules,
-) -> Vec<Finding> {
-    let finding = |rule: &str, place: Vec3, value: f64, limit: Limit| Finding {
-        rule: rule.to_owned(),
-        place,
-        value,
-        limit: limit.value,
-        source: limit.source.to_owned(),
-    };
-    let mut out = Vec::new();
-    let cores = rules.cores();
-    if mould.undercuts.len() as f64 > cores.value {
-        for undercut in &mould.undercuts {
-            let limit = Limit {
-                value: 0.0,
-                ..cores
-            };
-            out.push(finding("undercut", undercut.place, undercut.volume, limit));
-        }
-    }
-    let flatness = rules.flatness();
-    if mould.parting_flatness > flatness.value {
-        let (lo, hi) = mesh.bounds().unwrap_or_default();
-        let centre = (lo + hi) / 2.0;
-        let place = centre + (mould.parting - centre.dot(&mould.draw)) * mould.draw;
-        out.push(finding(
-            "parting_flatness",
-            place,
-            mould.parting_flatness,
-            flatness,
-        ));
-    }
-    let draft = rules.draft();
-    if mould.min_draft < draft.value
-        && let Some((place, _)) = draft::low_draft_place(mesh, &mould.draw, draft.value)
-    {
-        out.push(finding("min_draft", place, mould.min_draft, draft));
-    }
-    let wall = rules.wall();
-    if let Some(thin) = thin.filter(|thin| thin.thickness < wall.value) {
-        out.push(finding("min_wall", thin.place, thin.thickness, wall));
-    }
-    let ratio = rules.ratio();
-    if mould.wall_ratio > ratio.value {
-        let place = thick.map_or_else(Vec3::zeros, |wall| wall.place);
-        out.push(finding("wall_ratio", place, mould.wall_ratio, ratio));
-    }
-    out
 }
 
 /// Checks the options.

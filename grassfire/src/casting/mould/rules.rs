@@ -45,6 +45,14 @@ pub struct Rules {
     pub undercuts: Option<f64>,
     /// Largest ratio of thick to thin walls.
     pub wall_ratio: Option<f64>,
+    /// Largest change of a wall's thickness over the way along it.
+    pub transition: Option<f64>,
+    /// Least fillet of an inner edge, as a share of the sum of the two walls.
+    pub fillet: Option<f64>,
+    /// Narrowest gap or hole that sand or a core makes, mm.
+    pub min_hole: Option<f64>,
+    /// Largest inscribed ball in a junction over the thickest wall that meets there.
+    pub junction: Option<f64>,
 }
 
 /// A limit and where it comes from.
@@ -119,6 +127,42 @@ impl Rules {
             self.wall_ratio,
             2.0,
             "walls within 2 to 1 (foundry practice)",
+        )
+    }
+
+    /// Largest change of thickness over the way.
+    pub fn step(&self) -> Limit {
+        Self::or(
+            self.transition,
+            0.5,
+            "each side of a wall 1 in 4 (foundry practice)",
+        )
+    }
+
+    /// Least fillet over the sum of the two walls.
+    pub fn rounding(&self) -> Limit {
+        Self::or(
+            self.fillet,
+            0.2,
+            "a fifth to a third of the sum of both walls (dz-machine)",
+        )
+    }
+
+    /// Narrowest gap or hole, mm.
+    pub fn hole(&self) -> Limit {
+        let value = match self.process {
+            Process::Sand => 5.0,
+            Process::GravityDie => 3.0,
+        };
+        Self::or(self.min_hole, value, "3 to 5 mm (neway precision)")
+    }
+
+    /// Largest ratio of an inscribed ball.
+    pub fn ball(&self) -> Limit {
+        Self::or(
+            self.junction,
+            1.5,
+            "equal walls with the least fillets: T 1.45, X 1.75; T and L are preferred to V, Y and X (AFS)",
         )
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::mesh::shapes::cuboid;
+use crate::mesh::shapes::{self, cuboid};
 
 fn boxes(list: &[[f64; 6]]) -> TriMesh {
     let mut mesh = TriMesh::default();
@@ -316,4 +316,122 @@ fn a_bore_is_a_core_only_where_it_is_undercut() {
     let [before, after] = repaired.volume;
     // The room would have had a fifth of the volume.
     assert!((after / before - 1.0).abs() < 0.05, "{before} {after}");
+}
+
+/// Walls of 8 mm along z, 120 mm long, 70 mm from one end to the other, as a raster of rows from the lowest y on.
+fn meeting(rows: &[&str]) -> TriMesh {
+    let borders = [-35.0, -4.0, 4.0, 35.0];
+    shapes::walls(&borders, &borders, rows, 120.0)
+}
+
+fn sheet(mesh: &TriMesh) -> Mould {
+    let options = MouldOptions {
+        wall_samples: 20_000,
+        lines: 64,
+        ..along([0.0, 0.0, 1.0])
+    };
+    look(mesh, &options)
+}
+
+#[test]
+fn balls_in_junctions_of_equal_walls_are_known() {
+    // The circle that touches one flat side and two corners; four corners; two outer sides and the inner corner.
+    let l = 2.0 / (1.0 + 1.0 / 2.0_f64.sqrt());
+    for (rows, kind, exact) in [
+        (["...", "###", ".#."], JunctionKind::T, 1.25),
+        ([".#.", "###", ".#."], JunctionKind::X, 2.0_f64.sqrt()),
+        (["...", ".##", ".#."], JunctionKind::L, l),
+    ] {
+        let found = sheet(&meeting(&rows)).junctions;
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(found[0].kind, kind);
+        assert!((found[0].wall - 8.0).abs() < 0.08, "{found:?}");
+        assert!((found[0].ratio / exact - 1.0).abs() < 0.005, "{found:?}");
+        assert!(found[0].place.xy().norm() < 2.0);
+    }
+    // A wall alone has none.
+    assert!(sheet(&meeting(&["...", "###", "..."])).junctions.is_empty());
+}
+
+#[test]
+fn sharp_inner_edges_are_found_and_fillets_measured() {
+    let rule = |found: &Mould, name: &str| {
+        let named = found.findings.iter().filter(|f| f.rule == name);
+        named.cloned().collect::<Vec<_>>()
+    };
+    let sharp = sheet(&meeting(&["...", "###", ".#."]));
+    let fillets = rule(&sharp, "fillet");
+    assert!(!fillets.is_empty() && sharp.inner_edges.short > 0.02);
+    for finding in &fillets {
+        assert!(finding.value < 0.05, "{finding:?}");
+        assert!((finding.limit - 0.2 * 16.0).abs() < 0.05, "{finding:?}");
+        let from_edge =
+            finding.place - Vec3::new(4.0_f64.copysign(finding.place.x), 4.0, finding.place.z);
+        assert!(from_edge.norm() < 0.1, "{finding:?}");
+    }
+    // A quarter of a hollow cylinder between the two walls: 5 mm are more than 3.2, 2 mm are less.
+    for (radius, broken) in [(5.0, false), (2.0, true)] {
+        let found = rule(&sheet(&filleted(radius)), "fillet");
+        assert_eq!(!found.is_empty(), broken, "{found:?}");
+        for finding in found {
+            assert!((finding.value / radius - 1.0).abs() < 0.15, "{finding:?}");
+        }
+    }
+}
+
+/// Two walls of 8 mm at right angles with a fillet of facets of 15 degrees, no ends, in the inner edge at (4, 4).
+fn filleted(radius: f64) -> TriMesh {
+    let mut outline = vec![
+        [35.0, 4.0],
+        [35.0, -4.0],
+        [-4.0, -4.0],
+        [-4.0, 35.0],
+        [4.0, 35.0],
+    ];
+    let arc = (0..=6).map(|k| {
+        let angle = (180.0 + 15.0 * f64::from(k)).to_radians();
+        [
+            4.0 + radius + radius * angle.cos(),
+            4.0 + radius + radius * angle.sin(),
+        ]
+    });
+    outline.extend(arc);
+    let at = |k: usize, z: f64| {
+        let [x, y] = outline[k % outline.len()];
+        Vec3::new(x, y, z)
+    };
+    let count = outline.len() as u32;
+    let side = |k: u32| {
+        let (a, b) = (2 * k, 2 * ((k + 1) % count));
+        [[b, a, a + 1], [b, a + 1, b + 1]]
+    };
+    TriMesh {
+        points: (0..outline.len())
+            .flat_map(|k| [at(k, 0.0), at(k, 120.0)])
+            .collect(),
+        triangles: (0..count).flat_map(side).collect(),
+        tags: Vec::new(),
+    }
+}
+
+#[test]
+fn steps_of_walls_and_narrow_holes_are_found() {
+    let step = shapes::walls(&[0.0, 40.0, 80.0], &[0.0, 5.0, 10.0], &["##", "#."], 60.0);
+    let found = sheet(&step);
+    assert!(found.transition > 0.5, "{}", found.transition);
+    assert!(found.findings.iter().any(|f| f.rule == "transition"));
+    let even = shapes::walls(&[0.0, 80.0], &[0.0, 5.0], &["#"], 60.0);
+    assert!(sheet(&even).transition < 1e-6);
+    let (xs, ys) = ([0.0, 30.0, 34.0, 64.0], [0.0, 30.0, 34.0, 64.0]);
+    let hole = sheet(&shapes::walls(&xs, &ys, &["###", "#.#", "###"], 10.0));
+    let gaps: Vec<_> = hole
+        .findings
+        .iter()
+        .filter(|f| f.rule == "min_hole")
+        .collect();
+    assert!(!gaps.is_empty());
+    assert!(
+        gaps.iter()
+            .all(|f| (f.value - 4.0).abs() < 1e-6 && f.limit == 5.0)
+    );
 }

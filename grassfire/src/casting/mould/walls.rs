@@ -1,10 +1,10 @@
-//! Wall thickness by rays into the material.
+//! Walls: thickness by rays into the material, inscribed balls, and how steeply the thickness changes.
 
 use rayon::prelude::*;
 
 use crate::Vec3;
 use crate::mesh::distance::sample_surface;
-use crate::mesh::{Bvh, TriMesh};
+use crate::mesh::{Bvh, TangentBall, TangentBalls, TriMesh};
 
 /// A wall that was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -43,4 +43,107 @@ pub fn walls(mesh: &TriMesh, samples: usize) -> Vec<Wall> {
     let mut measured: Vec<Wall> = measured.collect();
     measured.sort_by(|a, b| a.thickness.total_cmp(&b.thickness));
     measured
+}
+
+/// The ball in the material at a place of the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inscribed {
+    /// The place, mm.
+    pub place: Vec3,
+    /// Its triangle.
+    pub triangle: u32,
+    /// The largest ball that touches there.
+    pub ball: TangentBall,
+}
+
+/// The largest balls in the material that touch at `samples` evenly spread places of the surface.
+pub fn inscribed(mesh: &TriMesh, balls: &TangentBalls, samples: usize) -> Vec<Inscribed> {
+    let Some((lo, hi)) = balls.bvh.bounds() else {
+        return Vec::new();
+    };
+    let most = (hi - lo).norm() / 2.0;
+    sample_surface(mesh, samples)
+        .into_par_iter()
+        .filter_map(|(place, triangle)| {
+            let ball = balls.at(&place, triangle, true, most)?;
+            Some(Inscribed {
+                place,
+                triangle,
+                ball,
+            })
+        })
+        .collect()
+}
+
+/// A ball lies between the two sides of one wall when it touches them within 15 degrees of opposite (cosine).
+const TWO_SIDES: f64 = -0.966;
+/// Two walls are one when their normals differ by less than 20 degrees (cosine).
+const SAME: f64 = 0.94;
+
+/// Balls whose two touches are the two sides of one wall.
+pub struct Walls<'a>(Vec<(&'a Inscribed, Vec3)>);
+
+/// A wall has its side at a place when its ball comes this near, radii from the centre, and its sides this near to parallel (cosine).
+const BESIDE: f64 = 1.5;
+const ALONG: f64 = 0.8;
+
+impl<'a> Walls<'a> {
+    /// Those of the inscribed balls that lie in walls.
+    pub fn new(balls: &TangentBalls, inscribed: &'a [Inscribed]) -> Self {
+        let opposite = |i: &&Inscribed| {
+            let [one, two] = [i.place, i.ball.touch].map(|p| p - i.ball.centre);
+            one.dot(&two) < TWO_SIDES * one.norm() * two.norm()
+        };
+        let walls = inscribed.iter().filter(opposite);
+        Self(
+            walls
+                .map(|i| (i, balls.normals[i.triangle as usize]))
+                .collect(),
+        )
+    }
+
+    /// Thickness of the wall that has a place of the surface with this normal on one of its sides, mm: that of the largest ball there; none
+    /// where no wall is.
+    pub fn thickness(&self, place: &Vec3, normal: &Vec3) -> Option<f64> {
+        let beside = self.0.iter().filter(|(i, n)| {
+            (i.ball.centre - place).norm() <= BESIDE * i.ball.radius && n.dot(normal).abs() > ALONG
+        });
+        let radii = beside.map(|(i, _)| 2.0 * i.ball.radius);
+        radii.max_by(f64::total_cmp)
+    }
+}
+
+/// How steeply walls change, steepest first: the place, and change of thickness over the way along the wall.
+///
+/// Compared are places with two parallel sides, half a thickness to two thicknesses apart in the same wall: between them lies the step. Where a wall ends in
+/// another one, or three meet, no sides are parallel.
+pub fn transitions(balls: &TangentBalls, inscribed: &[Inscribed]) -> Vec<(Vec3, f64)> {
+    let mut walls = Walls::new(balls, inscribed).0;
+    // Along x, so that those within reach are neighbours in the list.
+    walls.sort_by(|a, b| a.0.ball.centre.x.total_cmp(&b.0.ball.centre.x));
+    let steepest = |i: usize| {
+        let (one, n) = walls[i];
+        let reach = 4.0 * one.ball.radius;
+        let slope = |(other, normal): &(&Inscribed, Vec3)| {
+            let way = other.ball.centre - one.ball.centre;
+            let change = (one.ball.radius - other.ball.radius).abs();
+            let near = way.norm() <= reach && way.norm() >= one.ball.radius;
+            let level = way.dot(&n).abs() <= change + 0.1 * one.ball.radius;
+            let parallel = normal.dot(&n).abs() > SAME;
+            (near && level && parallel).then(|| 2.0 * change / way.norm())
+        };
+        let centre = one.ball.centre;
+        let up = walls[i + 1..]
+            .iter()
+            .take_while(|w| w.0.ball.centre.x - centre.x <= reach);
+        let down = walls[..i]
+            .iter()
+            .rev()
+            .take_while(|w| centre.x - w.0.ball.centre.x <= reach);
+        let steepest = up.chain(down).filter_map(slope).max_by(f64::total_cmp);
+        (centre, steepest.unwrap_or(0.0))
+    };
+    let mut out: Vec<(Vec3, f64)> = (0..walls.len()).into_par_iter().map(steepest).collect();
+    out.sort_by(|a, b| b.1.total_cmp(&a.1));
+    out
 }

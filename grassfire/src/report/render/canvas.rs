@@ -41,6 +41,16 @@ impl Canvas {
         }
     }
 
+    /// Writes `text` white in a red box around (x, y).
+    pub fn tag(&mut self, x: i64, y: i64, text: &str) {
+        const SIZE: RasterHeight = RasterHeight::Size24;
+        const BOX: Rgb = [198, 40, 40];
+        let (width, height) = (Self::text_width(text, SIZE), SIZE.val() as i64);
+        let (left, top) = (x - width / 2, y - height / 2);
+        self.fill(left - 3, top, width + 6, height, BOX);
+        self.text(left, top, text, SIZE, [255; 3]);
+    }
+
     /// Width of `text`, pixels.
     pub fn text_width(text: &str, size: RasterHeight) -> i64 {
         (text.chars().count() * get_raster_width(FontWeight::Regular, size)) as i64

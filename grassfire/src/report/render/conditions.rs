@@ -22,7 +22,7 @@ const NODE: f64 = 0.28;
 const ARROW: f64 = 0.18;
 const TIP: f64 = 0.03;
 /// Directions that the pictures are taken from, degrees: azimuth, elevation.
-const VIEWS: [(f64, f64, &str); 2] = [
+pub(super) const VIEWS: [(f64, f64, &str); 2] = [
     (-60.0, 30.0, "from above"),
     (120.0, -30.0, "from the other side, below"),
 ];

@@ -12,6 +12,7 @@
 mod camera;
 mod canvas;
 pub mod conditions;
+pub mod findings;
 mod finish;
 mod legend;
 pub mod pictures;
@@ -21,7 +22,7 @@ pub mod section;
 
 pub use camera::Camera;
 pub use legend::{ColourMap, Legend};
-pub use scene::{Colours, Rgb, Scene, SceneLine, SceneMesh, SceneSphere, Shading};
+pub use scene::{Colours, Rgb, Scene, SceneLabel, SceneLine, SceneMesh, SceneSphere, Shading};
 
 use canvas::Canvas;
 
@@ -77,6 +78,10 @@ pub fn render(scene: &Scene, camera: &Camera, size: PictureSize) -> Result<Vec<u
         height: height as usize,
         pixels: image,
     };
+    for label in &scene.labels {
+        let [x, y] = raster::pixel(&label.place, camera, width as usize, height as usize);
+        canvas.tag(x as i64, y as i64, &label.text);
+    }
     if let Some(legend) = &scene.legend {
         legend.draw(&mut canvas);
     }

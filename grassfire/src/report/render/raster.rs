@@ -118,6 +118,12 @@ pub(super) fn draw(scene: &Scene, camera: &Camera, width: usize, height: usize) 
     )
 }
 
+/// The pixel of a place.
+pub(super) fn pixel(p: &Vec3, camera: &Camera, width: usize, height: usize) -> [f64; 2] {
+    let [x, y, _] = View::new(camera, width, height).point(p);
+    [x.into(), y.into()]
+}
+
 /// Maps millimetres to subpixels.
 struct View<'a> {
     camera: &'a Camera,

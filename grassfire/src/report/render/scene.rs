@@ -93,6 +93,15 @@ pub struct SceneSphere {
     pub colour: Rgb,
 }
 
+/// A text in a box at a place, in front of everything.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneLabel {
+    /// Middle of the box, mm.
+    pub place: Vec3,
+    /// A few characters.
+    pub text: String,
+}
+
 /// Everything that one picture shows.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Scene {
@@ -102,6 +111,8 @@ pub struct Scene {
     pub lines: Vec<SceneLine>,
     /// Balls.
     pub spheres: Vec<SceneSphere>,
+    /// Texts.
+    pub labels: Vec<SceneLabel>,
     /// Colour scale drawn at the right edge.
     pub legend: Option<Legend>,
 }
