@@ -22,9 +22,11 @@ const VOLUME: f64 = 0.02;
 /// Runs at a time.
 const AT_ONCE: usize = 2;
 
-/// The default voxel everywhere but on the bulky plate.
+/// The default voxel where the damage may reach the later stages. What reading mends for good leaves the clean bracket, which a coarser one is enough
+/// for; the bulky plate needs one of its own.
 fn arguments(name: &str) -> &'static [&'static str] {
     match &name[..2] {
+        "03" | "04" | "05" | "06" | "14" | "15" | "21" => &["--voxel", "1.8"],
         // The plate is in inches.
         "07" | "23" | "24" | "25" => &["--voxel", "0.06"],
         _ => &[],
