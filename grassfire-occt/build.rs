@@ -14,6 +14,7 @@ fn main() {
         "cpp/bridge.h",
         "cpp/build.cpp",
         "cpp/boolean.cpp",
+        "cpp/fillet.cpp",
         "cpp/query.cpp",
         "cpp/exchange.cpp",
         "cpp/tessellate.cpp",
@@ -27,6 +28,7 @@ fn main() {
         .files([
             "cpp/build.cpp",
             "cpp/boolean.cpp",
+            "cpp/fillet.cpp",
             "cpp/query.cpp",
             "cpp/exchange.cpp",
             "cpp/tessellate.cpp",
@@ -59,6 +61,7 @@ fn main() {
         "TKXCAF",
         "TKLCAF",
         "TKCDF",
+        "TKFillet",
         "TKBO",
         "TKBool",
         "TKPrim",

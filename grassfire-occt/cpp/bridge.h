@@ -55,6 +55,11 @@ struct Boolean {
   std::vector<int32_t> origins;
 };
 
+struct Filleted {
+  TopoDS_Shape result;
+  std::vector<int32_t> origins;
+};
+
 rust::String occt_version();
 void silence();
 
@@ -77,6 +82,13 @@ std::unique_ptr<Shape> boolean_result(const Boolean& boolean);
 std::unique_ptr<Shape> boolean_common(const Boolean& boolean);
 rust::String boolean_warnings(const Boolean& boolean);
 rust::Vec<int32_t> boolean_origins(const Boolean& boolean);
+
+// fillet.cpp
+rust::Vec<uint32_t> fillet_contour(const Shape& shape, uint32_t edge);
+std::unique_ptr<Filleted> fillet(const Shape& shape, rust::Slice<const uint32_t> starts, rust::Slice<const double> radii, double seconds,
+                                 const Interrupt& interrupt);
+std::unique_ptr<Shape> fillet_result(const Filleted& filleted);
+rust::Vec<int32_t> fillet_origins(const Filleted& filleted);
 
 // query.cpp
 rust::String faults(const Shape& shape);

@@ -100,27 +100,47 @@ int kind_of(GeomAbs_SurfaceType type) {
 
 void put(std::array<double, 3>& out, const gp_XYZ& v) { out = {v.X(), v.Y(), v.Z()}; }
 
-// Largest angle between the normals of two faces along an edge: 9 points, through the curves on the surfaces.
+// Outward normal of a face at a share of one of its edges, through the curve on the surface; false where there is none.
+bool normal_at(const TopoDS_Edge& edge, const TopoDS_Face& face, double share, gp_Vec& normal) {
+  double a, b;
+  Handle(Geom2d_Curve) pcurve = BRep_Tool::CurveOnSurface(edge, face, a, b);
+  if (pcurve.IsNull()) return false;
+  const gp_Pnt2d uv = pcurve->Value(a + (b - a) * share);
+  gp_Pnt p;
+  gp_Vec u, v;
+  BRep_Tool::Surface(face)->D1(uv.X(), uv.Y(), p, u, v);
+  normal = u.Crossed(v);
+  if (face.Orientation() == TopAbs_REVERSED) normal.Reverse();
+  return true;
+}
+
+// Largest angle between the normals of two faces along an edge: 9 points.
 double normal_angle(const TopoDS_Edge& edge, const TopoDS_Face& first, const TopoDS_Face& second) {
   double worst = 0;
-  const TopoDS_Face face[2] = {first, second};
   for (int q = 1; q < 10; ++q) {
     gp_Vec normal[2];
-    for (int k = 0; k < 2; ++k) {
-      double a, b;
-      Handle(Geom2d_Curve) pcurve = BRep_Tool::CurveOnSurface(edge, face[k], a, b);
-      if (pcurve.IsNull()) return std::numeric_limits<double>::quiet_NaN();
-      const gp_Pnt2d uv = pcurve->Value(a + (b - a) * q / 10.);
-      gp_Pnt p;
-      gp_Vec u, v;
-      BRep_Tool::Surface(face[k])->D1(uv.X(), uv.Y(), p, u, v);
-      normal[k] = u.Crossed(v);
-      if (face[k].Orientation() == TopAbs_REVERSED) normal[k].Reverse();
-    }
+    if (!normal_at(edge, first, q / 10., normal[0]) || !normal_at(edge, second, q / 10., normal[1]))
+      return std::numeric_limits<double>::quiet_NaN();
     if (normal[0].Magnitude() < 1e-14 || normal[1].Magnitude() < 1e-14) continue;
     worst = std::max(worst, normal[0].Angle(normal[1]));
   }
   return worst;
+}
+
+// Whether the faces form an inner edge in the middle of the edge: going along it with the first face on the left, the second
+// rises above it.
+bool inner_edge(const TopoDS_Edge& edge, const TopoDS_Face& first, const TopoDS_Face& second) {
+  gp_Vec normal[2], along;
+  if (!normal_at(edge, first, 0.5, normal[0]) || !normal_at(edge, second, 0.5, normal[1])) return false;
+  const BRepAdaptor_Curve curve(edge);
+  gp_Pnt p;
+  curve.D1((curve.FirstParameter() + curve.LastParameter()) / 2, p, along);
+  for (TopExp_Explorer at(first, TopAbs_EDGE); at.More(); at.Next())
+    if (at.Current().IsSame(edge)) {
+      if (at.Current().Orientation() == TopAbs_REVERSED) along.Reverse();
+      return normal[0].Crossed(normal[1]).Dot(along) < 0;
+    }
+  return false;
 }
 
 }  // namespace
@@ -275,7 +295,10 @@ rust::Vec<EdgeInfo> edges(const Shape& s) {
     if (on(i).Extent() == 2) {
       const TopoDS_Face a = TopoDS::Face(on(i).First()), b = TopoDS::Face(on(i).Last());
       info.faces = {faces.FindIndex(a) - 1, faces.FindIndex(b) - 1};
-      if (!a.IsSame(b)) info.angle = normal_angle(edge, a, b);
+      if (!a.IsSame(b)) {
+        info.angle = normal_angle(edge, a, b);
+        info.concave = inner_edge(edge, a, b);
+      }
     }
     out.push_back(info);
   }

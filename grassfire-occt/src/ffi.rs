@@ -46,6 +46,7 @@ pub(crate) mod bridge {
         length: f64,
         faces: [i32; 2],
         angle: f64,
+        concave: bool,
         middle: [f64; 3],
     }
 
@@ -105,6 +106,7 @@ pub(crate) mod bridge {
 
         type Shape;
         type Boolean;
+        type Filleted;
 
         fn occt_version() -> String;
         fn silence();
@@ -137,6 +139,17 @@ pub(crate) mod bridge {
         fn boolean_common(boolean: &Boolean) -> Result<UniquePtr<Shape>>;
         fn boolean_warnings(boolean: &Boolean) -> String;
         fn boolean_origins(boolean: &Boolean) -> Vec<i32>;
+
+        fn fillet_contour(shape: &Shape, edge: u32) -> Result<Vec<u32>>;
+        fn fillet(
+            shape: &Shape,
+            starts: &[u32],
+            radii: &[f64],
+            seconds: f64,
+            interrupt: &Interrupt,
+        ) -> Result<UniquePtr<Filleted>>;
+        fn fillet_result(filleted: &Filleted) -> Result<UniquePtr<Shape>>;
+        fn fillet_origins(filleted: &Filleted) -> Vec<i32>;
 
         fn faults(shape: &Shape) -> Result<String>;
         fn counts(shape: &Shape) -> Result<Counts>;

@@ -21,8 +21,8 @@ use cxx::UniquePtr;
 use ffi::bridge;
 pub use ffi::bridge::Counts;
 pub use types::{
-    BooleanResult, BrepDescription, Edge, Face, Line, Operation, Origin, StepContents, StepTexts,
-    Surface, Triangulation,
+    BooleanResult, BrepDescription, Edge, Face, FilletResult, Line, Operation, Origin,
+    StepContents, StepTexts, Surface, Triangulation,
 };
 use types::{check_description, check_finite, edge, face, origin};
 
@@ -284,6 +284,49 @@ impl Shape {
                 .filter(|l| !l.is_empty())
                 .collect(),
             origins: origins.iter().map(|&code| origin(code)).collect(),
+        })
+    }
+
+    /// Edges that run on smoothly from one of [`Shape::edges`]: they get one fillet together.
+    pub fn fillet_contour(&self, edge: u32) -> Result<Vec<u32>> {
+        let _guard = lock();
+        Ok(bridge::fillet_contour(&self.0, edge)?)
+    }
+
+    /// Fillets: each a contour, by one of its edges, and a radius. The kernel gives up on many, and gives wrong solids for some: the
+    /// result must be checked.
+    ///
+    /// The kernel works in a process of its own, a copy of this one (`fork`), for at most `seconds` of processor time: it takes hours for some
+    /// fillets and cannot be asked to stop. No other call of this crate runs meanwhile, so that the copy finds the kernel at rest.
+    /// `interrupt` is asked now and then; true ends it with an error.
+    ///
+    /// # Errors
+    /// When the kernel finds no fillet, takes too long or breaks down.
+    pub fn fillet(
+        &self,
+        contours: &[(u32, f64)],
+        seconds: f64,
+        interrupt: &(dyn Fn() -> bool + Sync),
+    ) -> Result<FilletResult> {
+        let (starts, radii): (Vec<u32>, Vec<f64>) = contours.iter().copied().unzip();
+        check_finite(&radii)?;
+        if radii.iter().any(|r| *r <= 0.0) {
+            return Err(OcctError("the radius of a fillet must be positive".into()));
+        }
+        let guard = lock();
+        let made = bridge::fillet(
+            &self.0,
+            &starts,
+            &radii,
+            seconds,
+            &ffi::Interrupt(interrupt),
+        )?;
+        let shape = bridge::fillet_result(&made)?;
+        let origins = bridge::fillet_origins(&made);
+        drop(guard);
+        Ok(FilletResult {
+            shape: Shape(shape),
+            origins: origins.iter().map(|o| u32::try_from(*o).ok()).collect(),
         })
     }
 

@@ -228,3 +228,27 @@ fn brep_and_iges_come_back() -> std::result::Result<(), Box<dyn std::error::Erro
     assert!(Shape::read_brep(&path).is_err() && Shape::read_iges(&path).is_err());
     Ok(())
 }
+
+#[test]
+fn a_fillet_fills_its_inner_edge() -> Result<()> {
+    let foot = Shape::cuboid([0.0; 3], [40.0, 20.0, 5.0])?;
+    let wall = Shape::cuboid([0.0; 3], [5.0, 20.0, 30.0])?;
+    let angle = foot.boolean(Operation::Fuse, &wall, 1e-5, false, &never)?;
+    let angle = angle.shape.unified()?;
+    let edges = angle.edges()?;
+    let inner: Vec<usize> = (0..edges.len()).filter(|&e| edges[e].concave).collect();
+    assert_eq!(inner.len(), 1);
+    let contour = angle.fillet_contour(inner[0] as u32)?;
+    assert_eq!(contour, [inner[0] as u32]);
+    let made = angle.fillet(&[(contour[0], 3.0)], 20.0, &never)?;
+    let added = 9.0 * (1.0 - std::f64::consts::FRAC_PI_4) * 20.0;
+    let volume = made.shape.volume(1e-9)? - angle.volume(1e-9)?;
+    assert!((volume - added).abs() < 1e-6, "{volume}");
+    assert_eq!(made.shape.faults()?, None);
+    assert_eq!(made.origins.iter().filter(|o| o.is_none()).count(), 1);
+    assert!(angle.fillet(&[(contour[0], 100.0)], 20.0, &never).is_err());
+    assert!(angle.fillet(&[(999, 1.0)], 20.0, &never).is_err());
+    let stopped = angle.fillet(&[(contour[0], 3.0)], 20.0, &|| true);
+    assert!(stopped.is_err());
+    Ok(())
+}

@@ -88,6 +88,8 @@ pub struct Edge {
     pub faces: Option<[u32; 2]>,
     /// Largest angle between the two faces' normals along the edge, radians; `None` on a seam or a free edge.
     pub angle: Option<f64>,
+    /// It is an inner edge at its middle: the two faces open towards each other.
+    pub concave: bool,
     /// Middle of the edge, mm.
     pub middle: [f64; 3],
 }
@@ -114,6 +116,15 @@ pub struct BooleanResult {
     pub warnings: Vec<String>,
     /// For each face of `shape` where it comes from.
     pub origins: Vec<Origin>,
+}
+
+/// Result of [`Shape::fillet`].
+#[derive(Debug)]
+pub struct FilletResult {
+    /// The new shape.
+    pub shape: Shape,
+    /// For each face of `shape` the face that it is what is left of; none for a fillet.
+    pub origins: Vec<Option<u32>>,
 }
 
 /// Boolean operations.
@@ -274,6 +285,7 @@ pub(crate) fn edge(info: &bridge::EdgeInfo) -> Edge {
         length: info.length,
         faces: (a >= 0 && b >= 0).then_some([a as u32, b as u32]),
         angle: (!info.angle.is_nan()).then_some(info.angle),
+        concave: info.concave,
         middle: info.middle,
     }
 }

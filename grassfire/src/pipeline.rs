@@ -366,6 +366,7 @@ fn rebuild(
     }
     record.report.non_design = part.non_design.clone();
     record.report.flats = part.flats.clone();
+    record.report.fillets = part.fillets.clone();
     let added = remeshed.solid.volume() - original.solid.volume();
     let feeders = feeding::poured(record, part.volume, added);
     record.report.refused = record.stage("write", || {

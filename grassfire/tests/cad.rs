@@ -7,10 +7,11 @@ use std::f64::consts::PI;
 
 use cad_common::{corpus, cuboid, joined, read_stl};
 use grassfire::Vec3;
+use grassfire::cad::FaceSource;
 use grassfire::cad::{
     CadError, CadOptions, CadSolid, NonDesignBody, NonDesignOptions, Rebuilt, StepOptions,
 };
-use grassfire::cad::{build, from_mesh, read, tessellate, write_step};
+use grassfire::cad::{build, from_mesh, read, round_edges, tessellate, write_step};
 use grassfire::mesh::{Solid, TriMesh};
 use grassfire::monitor::Monitor;
 use grassfire::spline::Brep;
@@ -120,6 +121,45 @@ fn ring_is_united_and_its_bore_is_open() -> Result {
     let mesh = Solid::try_from(tessellate(&solid, 0.02)?)?;
     assert_eq!(mesh.euler(), 0);
     assert!((mesh.volume() - exact).abs() < 2e-3 * exact);
+    Ok(())
+}
+
+#[test]
+fn inner_edges_around_an_eye_get_fillets() -> Result {
+    // The eye stands 2 mm out of both sides of the block.
+    let bodies = ring(0.0)?;
+    let (options, monitor) = (CadOptions::default(), Monitor::default());
+    let sharp = assemble(&block(), &bodies)?;
+    let (before, faces) = (sharp.volume, sharp.faces);
+    let (round, fillets) = round_edges(sharp, &|_| 1.5, &bodies, &options, &monitor)?;
+    assert_eq!(fillets.len(), 2);
+    assert!(fillets.iter().all(|f| f.radius == Some(1.5)), "{fillets:?}");
+    // Pappus and Guldin: what a quarter circle leaves of its square, at its centre of area.
+    let (section, away) = (
+        2.25 * (1.0 - PI / 4.0),
+        1.5 * (10.0 - 3.0 * PI) / (12.0 - 3.0 * PI),
+    );
+    let exact = 2.0 * 2.0 * PI * (7.0 + away) * section;
+    assert!(
+        (round.volume - before - exact).abs() < 1e-3,
+        "{}",
+        round.volume - before
+    );
+    assert!(round.valid && round.non_design[0].kept && round.faces > faces);
+    assert!(round.sources.contains(&FaceSource::Fillet));
+    // Where none can be the edges stay sharp, with a reason.
+    let (same, none) = round_edges(
+        assemble(&block(), &bodies)?,
+        &|_| 50.0,
+        &bodies,
+        &options,
+        &monitor,
+    )?;
+    assert!((same.volume - before).abs() < 1e-9);
+    assert!(
+        none.iter()
+            .all(|f| f.radius.is_none() && f.reason.is_some())
+    );
     Ok(())
 }
 

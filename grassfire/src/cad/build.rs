@@ -23,6 +23,8 @@ pub enum FaceSource {
     Bore(u32, u32),
     /// Cut plane at flat face `.0` of the proposal.
     Flat(u32),
+    /// A fillet between the fitted body and a non-design body.
+    Fillet,
 }
 
 /// The finished part with everything that was checked on it.

@@ -3,7 +3,7 @@
 //! 1. [`read`] (STEP) or [`from_mesh`] make exact [`NonDesignBody`]s and find their bores.
 //! 2. [`build`] makes the body's B-rep directly (shared edges, exact pcurves, no sewing), fuses the non-design bodies with
 //!    their bores filled, cuts the bores last, and checks every step with volumes that do not come from the CAD kernel.
-//! 3. [`trim`] cuts it plane where that is asked for.
+//! 3. [`trim`] cuts it plane, [`round_edges`] gives it fillets where that is asked for.
 //! 4. [`write_step`], [`write_brep`], [`write_iges`], [`write_pieces`], [`write_casting`] and [`tessellate`] give the files.
 //!
 //! Without the feature `occt` only the options, the error and the recognition of surfaces in meshes ([`primitives`]) are here.
@@ -20,6 +20,8 @@ mod build;
 mod casting;
 #[cfg(feature = "occt")]
 mod faces;
+#[cfg(feature = "occt")]
+mod fillets;
 #[cfg(feature = "occt")]
 mod inspect;
 #[cfg(feature = "occt")]
@@ -46,7 +48,7 @@ mod trim;
 mod unite;
 
 pub use error::CadError;
-pub use options::{CadOptions, NonDesignOptions, StepOptions};
+pub use options::{CadOptions, FilletRadius, FilletRule, NonDesignOptions, StepOptions};
 
 #[cfg(feature = "occt")]
 pub use {
@@ -54,6 +56,7 @@ pub use {
     build::{CadSolid, FaceSource, Joined, build, finish, join},
     casting::{FeederBody, write_casting},
     faces::{FaceText, read_faces},
+    fillets::{Fillet, round_edges},
     inspect::NonDesignResult,
     non_design::{
         DesignSpace, NonDesignBody, Rebuilt, SpaceBore, from_boss, from_mesh, from_shape, read,

@@ -7,7 +7,7 @@ use super::build::{CadSolid, FaceSource};
 /// Colour of the fitted body.
 const ORGANIC: [u8; 3] = [176, 184, 193];
 
-/// Name and colour of every face: `organic`, `flat 2`, `boss 3: wall`, `boss 3: bore`.
+/// Name and colour of every face: `organic`, `flat 2`, `fillet`, `boss 3: wall`, `boss 3: bore`.
 pub(super) fn faces(solid: &CadSolid) -> Result<(Vec<String>, Vec<[u8; 3]>), OcctError> {
     let faces = solid.shape.faces()?;
     let name = |(face, source): (&Face, &FaceSource)| face_name(solid, face, *source);
@@ -62,6 +62,7 @@ fn face_name(solid: &CadSolid, face: &Face, source: FaceSource) -> String {
     let (body, what) = match source {
         FaceSource::Organic => return "organic".into(),
         FaceSource::Flat(i) => return format!("flat {}", i + 1),
+        FaceSource::Fillet => return "fillet".into(),
         FaceSource::Body(i) => (i, kind(&face.surface).to_owned()),
         FaceSource::Bore(i, k) => {
             let bores = solid
@@ -100,7 +101,7 @@ fn color(source: &FaceSource) -> [u8; 3] {
     // The last colour of the table is a grey.
     let table = &colorous::TABLEAU10[..9];
     match source {
-        FaceSource::Organic | FaceSource::Flat(_) => ORGANIC,
+        FaceSource::Organic | FaceSource::Flat(_) | FaceSource::Fillet => ORGANIC,
         FaceSource::Body(i) | FaceSource::Bore(i, _) => {
             let c = table[*i as usize % table.len()];
             [c.r, c.g, c.b]

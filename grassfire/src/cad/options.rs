@@ -5,6 +5,26 @@ use serde::{Deserialize, Serialize};
 
 use crate::non_design::{DomainOptions, RecogniseMode, RecogniseOptions};
 
+/// Fillets by a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FilletRule {
+    /// None.
+    Off,
+    /// As large as the foundry's rule (`mould.rules.fillet`) says for the walls that meet.
+    Rule,
+}
+
+/// Fillets where members meet non-design bodies.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum FilletRadius {
+    /// By a word.
+    Word(FilletRule),
+    /// Of this radius, mm.
+    Radius(f64),
+}
+
 /// How the B-rep is built, united and checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -29,6 +49,11 @@ pub struct CadOptions {
     pub sink: f64,
     /// Rays across each non-design body in the independent volume check.
     pub rays: u32,
+    /// Fillets at the inner edges between the fitted body and non-design bodies: a radius in mm, `rule` or `off`. Where the kernel
+    /// finds none, smaller ones are tried.
+    pub fillet: FilletRadius,
+    /// A fillet that takes the kernel more processor time than this stays away, s.
+    pub fillet_seconds: f64,
 }
 
 impl Default for CadOptions {
@@ -43,6 +68,8 @@ impl Default for CadOptions {
             least_edge: 0.35,
             sink: 0.35,
             rays: 400,
+            fillet: FilletRadius::Word(FilletRule::Off),
+            fillet_seconds: 20.0,
         }
     }
 }

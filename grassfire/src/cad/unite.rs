@@ -12,7 +12,7 @@ use crate::Vec3;
 use crate::monitor::Monitor;
 
 /// Largest tolerance accepted in a part, mm.
-const MAX_TOLERANCE: f64 = 1e-2;
+pub(super) const MAX_TOLERANCE: f64 = 1e-2;
 /// Chord (mm) and facet angle (radians) of the triangulation that is compared with the reference, on faces of bosses and bores.
 const CHECK_MESH: [f64; 2] = [0.01, 0.2];
 /// The same on the fitted body's faces: these only touch the regions that are compared, along edges of the others.

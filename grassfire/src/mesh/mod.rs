@@ -7,7 +7,7 @@ pub mod self_intersection;
 #[cfg(test)]
 pub(crate) mod shapes;
 mod solid;
-mod tangent_ball;
+pub mod tangent_ball;
 pub mod winding;
 
 pub use bvh::{Bvh, Nearest};

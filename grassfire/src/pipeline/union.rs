@@ -7,14 +7,20 @@ use super::error::StageError;
 use super::exchange::Format;
 use super::shape::Surface;
 #[cfg(feature = "occt")]
-use crate::cad::{self, CadSolid, NonDesignResult};
+use crate::Vec3;
+#[cfg(feature = "occt")]
+use crate::cad::{self, CadSolid, Fillet, FilletRadius, FilletRule, NonDesignResult};
+#[cfg(feature = "occt")]
+use crate::casting::mould::{Walls, inscribed};
+#[cfg(feature = "occt")]
+use crate::mesh::TangentBalls;
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
 #[cfg(feature = "occt")]
 use crate::non_design::Flat;
 #[cfg(feature = "occt")]
 use crate::report::BoreBlock;
-use crate::report::{FlatBlock, NonDesignBlock, SolidBlock};
+use crate::report::{FilletBlock, FlatBlock, NonDesignBlock, SolidBlock};
 #[cfg(not(feature = "occt"))]
 use crate::spline::Crowded;
 use crate::topology::Betti;
@@ -35,6 +41,8 @@ pub(super) struct Part {
     pub(super) non_design: Vec<NonDesignBlock>,
     /// Report entries of the flat faces.
     pub(super) flats: Vec<FlatBlock>,
+    /// Report entries of the fillets.
+    pub(super) fillets: Vec<FilletBlock>,
 }
 
 /// Chord of the part's triangles, voxels: well below what any figure of the report resolves.
@@ -203,6 +211,7 @@ pub(super) fn united(
         );
     }
     let (solid, flats) = trimmed(solid, bodies, voxel, options, monitor)?;
+    let (solid, fillets) = rounded(solid, bodies, voxel, options, monitor)?;
     let block = SolidBlock {
         valid: solid.valid,
         bodies: solid.bodies,
@@ -234,8 +243,46 @@ pub(super) fn united(
         block: Some(block),
         non_design,
         flats,
+        fillets,
         solid,
     })
+}
+
+/// Gives inner edges between the fitted body and non-design bodies the fillets that are asked for, and tells of each.
+#[cfg(feature = "occt")]
+fn rounded(
+    solid: CadSolid,
+    bodies: &Bodies,
+    voxel: f64,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<(CadSolid, Vec<FilletBlock>), StageError> {
+    let round = |radius_at: &dyn Fn(&Vec3) -> f64, solid| {
+        cad::round_edges(solid, radius_at, &bodies.solids, &options.cad, monitor)
+    };
+    let (solid, fillets) = match options.cad.fillet {
+        FilletRadius::Word(FilletRule::Off) => return Ok((solid, Vec::new())),
+        FilletRadius::Radius(radius) => round(&|_| radius, solid)?,
+        FilletRadius::Word(FilletRule::Rule) => {
+            let mesh = cad::tessellate(&solid, CHORD * voxel)?;
+            let balls = TangentBalls::new(&mesh);
+            let inscribed = inscribed(&mesh, &balls, options.mould.wall_samples);
+            let walls = Walls::new(&balls, &inscribed);
+            let share = options.mould.rules.rounding().value;
+            round(
+                &|p| share * walls.meeting(&balls, p).unwrap_or(4.0 * voxel),
+                solid,
+            )?
+        }
+    };
+    let block = |fillet: Fillet| FilletBlock {
+        place: fillet.place.into(),
+        length: fillet.length,
+        wanted: fillet.wanted,
+        radius: fillet.radius,
+        reason: fillet.reason,
+    };
+    Ok((solid, fillets.into_iter().map(block).collect()))
 }
 
 /// Cuts the part plane at the flat faces that can be, and tells of each.
@@ -349,6 +396,7 @@ pub(super) fn united(
         block: None,
         non_design: Vec::new(),
         flats: Vec::new(),
+        fillets: Vec::new(),
     })
 }
 

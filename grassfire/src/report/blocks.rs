@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Check, EditBlock, FeedBlock, MouldBlock, RepairsBlock, SolidifyBlock, VerifyBlock};
+use super::{
+    Check, EditBlock, FeedBlock, FilletBlock, MouldBlock, RepairsBlock, SolidifyBlock, VerifyBlock,
+};
 use crate::monitor::Warning;
 use crate::remesh::{ChangeKind, TopologyChange};
 use crate::spline::CurvatureJump;
@@ -71,6 +73,9 @@ pub struct Report {
     /// Flat faces that were to become exactly plane.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub flats: Vec<FlatBlock>,
+    /// Inner edges that were to get fillets.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub fillets: Vec<FilletBlock>,
     /// Faces of the design space.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub design_space: Vec<DesignFaceBlock>,

@@ -152,6 +152,23 @@ pub struct MouldBlock {
     pub multiple_lines: Option<usize>,
 }
 
+/// An inner edge between the fitted body and a non-design body that was to get a fillet.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct FilletBlock {
+    /// Middle of its longest edge, mm.
+    pub place: [f64; 3],
+    /// Length, mm.
+    pub length: f64,
+    /// Radius that was wanted, mm.
+    pub wanted: f64,
+    /// Radius that it has, mm; none where it stays sharp.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius: Option<f64>,
+    /// Why it has none or a smaller one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
 /// An undercut.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct UndercutBlock {
@@ -238,6 +255,7 @@ pub(super) fn sections(report: &Report) -> Markup {
     html! {
         @if let Some(block) = &report.feed { (feed(block)) }
         @if let Some(block) = &report.mould { (mould(block)) }
+        @if !report.fillets.is_empty() { (fillets(&report.fillets)) }
         @if let Some(block) = &report.solidify { (solidify(block)) }
     }
 }
@@ -308,6 +326,30 @@ fn solidify(block: &SolidifyBlock) -> Markup {
             } }
         }
         p .soft { "Sources: " (block.sources.join("; ")) }
+    }
+}
+
+fn fillets(blocks: &[FilletBlock]) -> Markup {
+    let whole: f64 = blocks.iter().map(|one| one.length).sum();
+    let rounded = blocks.iter().filter(|one| one.radius.is_some());
+    let rounded: f64 = rounded.map(|one| one.length).sum();
+    html! {
+        h2 { "Fillets" }
+        p .soft { "Inner edges between the fitted body and non-design bodies: " (with_unit(rounded, 3, "mm")) " of " (with_unit(whole, 3, "mm")) " have fillets." }
+        div .scroll { table {
+            thead { tr { th { "Place" } th .n { "Length" } th .n { "Wanted" } th .n { "Radius" } th { "Why not" } } }
+            tbody {
+                @for one in blocks {
+                    tr {
+                        td { (place(&one.place)) }
+                        td .n { (with_unit(one.length, 3, "mm")) }
+                        td .n { (with_unit(one.wanted, 2, "mm")) }
+                        td .n { @match one.radius { Some(radius) => (with_unit(radius, 2, "mm")), None => "sharp" } }
+                        td { (one.reason.as_deref().unwrap_or_default()) }
+                    }
+                }
+            }
+        } }
     }
 }
 

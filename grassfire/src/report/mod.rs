@@ -28,8 +28,8 @@ pub use blocks::{
     TopologyBlock, TopologyChangeEntry, VolumeBlock,
 };
 pub use casting::{
-    FeedBlock, FeederBlock, FindingBlock, HotSpotBlock, InfeasibleBlock, MouldBlock, SolidifyBlock,
-    UndercutBlock,
+    FeedBlock, FeederBlock, FilletBlock, FindingBlock, HotSpotBlock, InfeasibleBlock, MouldBlock,
+    SolidifyBlock, UndercutBlock,
 };
 pub use checks::{Check, Limits, judge};
 pub use editing::EditBlock;

@@ -32,7 +32,7 @@ pub use repair::{Repair, RepairOptions, Repaired, repair};
 pub use rooms::{Room, rooms};
 pub use rules::{Alloy, Limit, Process, Rules};
 pub use undercuts::{Undercut, parting, undercuts};
-pub use walls::{Inscribed, Wall, inscribed, transitions, walls};
+pub use walls::{Inscribed, Wall, Walls, inscribed, transitions, walls};
 
 use crate::Vec3;
 use crate::mesh::{TangentBalls, TriMesh};

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use crate::Vec3;
 use crate::mesh::distance::sample_surface;
+use crate::mesh::tangent_ball::SMOOTH;
 use crate::mesh::{Bvh, TangentBall, TangentBalls, TriMesh};
 
 /// A wall that was measured.
@@ -83,8 +84,7 @@ const SAME: f64 = 0.94;
 /// Balls whose two touches are the two sides of one wall.
 pub struct Walls<'a>(Vec<(&'a Inscribed, Vec3)>);
 
-/// A wall has its side at a place when its ball comes this near, radii from the centre, and its sides this near to parallel (cosine).
-const BESIDE: f64 = 1.5;
+/// Normals of one side of a wall differ by less than this (cosine of 37 degrees).
 const ALONG: f64 = 0.8;
 
 impl<'a> Walls<'a> {
@@ -102,14 +102,24 @@ impl<'a> Walls<'a> {
         )
     }
 
-    /// Thickness of the wall that has a place of the surface with this normal on one of its sides, mm: that of the largest ball there; none
+    /// Thickness of the wall that has a place of the surface with this normal on one of its sides, mm: measured where the side is nearest; none
     /// where no wall is.
     pub fn thickness(&self, place: &Vec3, normal: &Vec3) -> Option<f64> {
-        let beside = self.0.iter().filter(|(i, n)| {
-            (i.ball.centre - place).norm() <= BESIDE * i.ball.radius && n.dot(normal).abs() > ALONG
-        });
-        let radii = beside.map(|(i, _)| 2.0 * i.ball.radius);
-        radii.max_by(f64::total_cmp)
+        let along = self.0.iter().filter(|(_, n)| n.dot(normal) > ALONG);
+        let away = |i: &Inscribed| (i.place - place).norm_squared();
+        let nearest = along.min_by(|a, b| away(a.0).total_cmp(&away(b.0)));
+        nearest.map(|(i, _)| 2.0 * i.ball.radius)
+    }
+
+    /// Sum of the thickness of the two walls that meet in an edge at a place, mm; none where no wall is. `balls` are those of the surface.
+    pub fn meeting(&self, balls: &TangentBalls, place: &Vec3) -> Option<f64> {
+        let first = balls.bvh.nearest(place, f64::INFINITY)?;
+        let normal = balls.normals[first.triangle as usize];
+        let across = |t: u32, _: &Vec3| balls.normals[t as usize].dot(&normal) < SMOOTH;
+        let second = balls.bvh.nearest_where(place, f64::INFINITY, across)?;
+        let one = self.thickness(place, &normal);
+        let other = self.thickness(place, &balls.normals[second.triangle as usize]);
+        Some(one.or(other)? + other.or(one)?)
     }
 }
 
