@@ -18,12 +18,14 @@
 #include <BRepFilletAPI_MakeFillet.hxx>
 #include <BRep_Tool.hxx>
 #include <BinTools.hxx>
+#include <Geom_BSplineSurface.hxx>
 #include <TopExp.hxx>
 #include <TopTools_IndexedDataMapOfShapeListOfShape.hxx>
 #include <TopTools_IndexedMapOfShape.hxx>
 #include <TopTools_ListOfShape.hxx>
 #include <TopoDS.hxx>
 #include <TopoDS_Edge.hxx>
+#include <TopoDS_Face.hxx>
 
 namespace grassfire {
 namespace {
@@ -38,6 +40,16 @@ std::vector<TopoDS_Edge> edges_of(const TopoDS_Shape& shape) {
     if (!BRep_Tool::Degenerated(edge)) out.push_back(edge);
   }
   return out;
+}
+
+// Control points of a face beyond which a fillet is no use to a designer: the kernel gives some thousands of knots where it hardly finds a
+// way, and files of many megabytes.
+constexpr int MOST_POLES = 1500;
+constexpr int TOO_FINE = 2;
+
+int poles(const TopoDS_Face& face) {
+  Handle(Geom_BSplineSurface) surface = Handle(Geom_BSplineSurface)::DownCast(BRep_Tool::Surface(face));
+  return surface.IsNull() ? 0 : surface->NbUPoles() * surface->NbVPoles();
 }
 
 // The fillets and where the faces come from, into a file; 0 when all went well. In a process of its own: the kernel may take hours for
@@ -70,6 +82,8 @@ int write_fillet(const TopoDS_Shape& shape, rust::Slice<const uint32_t> starts, 
         if (at > 0) origins[size_t(at) - 1] = i - 1;
       }
     }
+    for (int i = 1; i <= after.Extent(); ++i)
+      if (origins[size_t(i) - 1] < 0 && poles(TopoDS::Face(after(i))) > MOST_POLES) return TOO_FINE;
     std::ostringstream text;
     text << origins.size() << '\n';
     for (int32_t o : origins) text << o << '\n';
@@ -146,6 +160,7 @@ std::unique_ptr<Filleted> fillet(const Shape& s, rust::Slice<const uint32_t> sta
   if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL))
     throw std::runtime_error("the kernel took too long");
   if (!WIFEXITED(status)) throw std::runtime_error("the kernel broke down");
+  if (WEXITSTATUS(status) == TOO_FINE) throw std::runtime_error("the kernel's fillet would have thousands of control points");
   if (WEXITSTATUS(status) != 0) throw std::runtime_error("the kernel found no fillet");
   return read_fillet(file);
 }

@@ -110,12 +110,6 @@ pub fn round_edges(
     };
     let sources = sources(&solid, &made, bodies, options)?;
     let rounded = inspect::again(&solid, made.shape, sources, volume, bodies, options)?;
-    for b in &rounded.non_design {
-        eprintln!(
-            "DEBUG {} {} {} {}",
-            b.name, b.kept, b.max_distance, b.coverage
-        );
-    }
     if let Some(body) = rounded.non_design.iter().find(|body| !body.kept) {
         for fillet in &mut fillets {
             fillet.radius = None;

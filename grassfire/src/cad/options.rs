@@ -69,7 +69,7 @@ impl Default for CadOptions {
             sink: 0.35,
             rays: 400,
             fillet: FilletRadius::Word(FilletRule::Off),
-            fillet_seconds: 20.0,
+            fillet_seconds: 10.0,
         }
     }
 }

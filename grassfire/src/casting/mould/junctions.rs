@@ -55,6 +55,8 @@ const NEARLY: f64 = 1.3;
 const DIRECTIONS: usize = 12;
 const STEP: f64 = 0.5;
 const GROWTH: f64 = 1.04;
+/// Steps uphill at most.
+const STEPS: usize = 100;
 /// Walls are looked for this many radii from the centre.
 const RING: f64 = 2.5;
 /// Rays around the centre.
@@ -112,9 +114,9 @@ fn apart(mut balls: Vec<TangentBall>) -> Vec<TangentBall> {
 }
 
 /// Directions from a centre to where its ball touches, the nearest first; those within `leans` times its distance.
-fn touches(balls: &TangentBalls, centre: &Vec3, leans: f64) -> (f64, Vec<Vec3>) {
+fn touches(balls: &TangentBalls, centre: &Vec3, leans: f64) -> Vec<Vec3> {
     let mut out: Vec<Vec3> = Vec::new();
-    let (mut radius, mut reach) = (0.0, f64::INFINITY);
+    let mut reach = f64::INFINITY;
     while out.len() < TOUCHES {
         let elsewhere = |_: u32, q: &Vec3| {
             let u = (q - centre).normalize();
@@ -124,15 +126,14 @@ fn touches(balls: &TangentBalls, centre: &Vec3, leans: f64) -> (f64, Vec<Vec3>) 
             break;
         };
         if out.is_empty() {
-            radius = near.distance;
-            reach = leans * radius;
+            reach = leans * near.distance;
         }
         let Some(direction) = (near.point - centre).try_normalize(0.0) else {
             break;
         };
         out.push(direction);
     }
-    (radius, out)
+    out
 }
 
 /// The ball that a ball becomes when it moves to where it can grow.
@@ -158,8 +159,11 @@ fn uphill(balls: &TangentBalls, ball: &TangentBall) -> TangentBall {
         (centre, radius) = (place, larger);
     }
     let mut step = STEP * radius;
-    while step > 1e-3 * ball.radius {
-        let (_, held) = touches(balls, &centre, LEANS);
+    for _ in 0..STEPS {
+        if step < 1e-3 * ball.radius {
+            break;
+        }
+        let held = touches(balls, &centre, LEANS);
         let away = -nearest_of_hull(&held);
         let Some(away) = away.try_normalize(0.02) else {
             break;
@@ -201,7 +205,7 @@ fn nearest_of_hull(points: &[Vec3]) -> Vec3 {
 
 /// The junction that a ball lies in; none in a single wall, at its end and in bulk.
 fn junction(balls: &TangentBalls, centre: Vec3, radius: f64) -> Option<Junction> {
-    let (_, touch) = touches(balls, &centre, NEARLY);
+    let touch = touches(balls, &centre, NEARLY);
     let &[first, second, third, ..] = touch.as_slice() else {
         return None;
     };
