@@ -43,12 +43,9 @@ impl Direction {
 
 /// Lines along the longer side in the first round.
 const COARSE: usize = 48;
-/// This many of the best are looked at closely,
+/// This many of the best are looked at closely.
 const KEPT: usize = 12;
-/// all of them at least 6 degrees apart (cosine): undercuts fall towards directions far from each other, and which is deepest shows
-/// at the bottom only.
-const BESIDE: f64 = 0.994_52;
-/// Turns tried around each, degrees.
+/// Turns tried around the best, degrees.
 const TURNS: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
 /// Undercuts below this share of the part's volume are the lattice's.
 pub const SLACK: f64 = 2e-4;
@@ -57,8 +54,7 @@ pub const SLACK: f64 = 2e-4;
 ///
 /// 1. `count` directions spread evenly over a half-space (a Fibonacci spiral), the axes and the normals that much area
 ///    shares, on a coarse lattice.
-/// 2. The best of these that lie apart, on `lines` lines: each is turned by smaller and smaller angles as long as that helps, and
-///    the best of them is taken.
+/// 2. The best of these on `lines` lines; then the best is turned by smaller and smaller angles as long as that helps.
 ///
 /// O(directions * triangles); the result does not depend on the number of threads.
 ///
@@ -72,50 +68,37 @@ pub fn best_direction(
     monitor: &Monitor,
 ) -> Result<Direction, Cancelled> {
     let slack = SLACK * mesh.volume().abs();
+    let look = |draws: &[Vec3], lines: usize| -> Result<Vec<Direction>, Cancelled> {
+        let seen = draws.par_iter().map(|draw| {
+            monitor.check()?;
+            Ok(judge(mesh, draw, lines, draft))
+        });
+        let mut seen: Vec<Direction> = seen.collect::<Result<_, Cancelled>>()?;
+        seen.sort_by(|a, b| a.compare(b, slack));
+        Ok(seen)
+    };
     let mut draws = spiral(count);
     draws.extend([Vec3::x(), Vec3::y(), Vec3::z()]);
     draws.extend(shared_normals(mesh));
-    let coarse = draws.par_iter().map(|draw| {
-        monitor.check()?;
-        Ok(judge(mesh, draw, lines.min(COARSE), draft))
-    });
-    let mut coarse: Vec<Direction> = coarse.collect::<Result<_, Cancelled>>()?;
-    coarse.sort_by(|a, b| a.compare(b, slack));
-    let mut kept: Vec<Vec3> = Vec::new();
-    for direction in &coarse {
-        let beside = |other: &Vec3| other.dot(&direction.draw).abs() > BESIDE;
-        if kept.len() < KEPT && !kept.iter().any(beside) {
-            kept.push(direction.draw);
-        }
-    }
-    let turned = kept.par_iter().map(|draw| {
-        monitor.check()?;
-        Ok(turned(mesh, draw, lines, draft, slack))
-    });
-    let turned: Vec<Direction> = turned.collect::<Result<_, Cancelled>>()?;
-    let best = turned.into_iter().min_by(|a, b| a.compare(b, slack));
-    Ok(best.unwrap_or_default())
-}
-
-/// A direction turned by smaller and smaller angles as long as that helps.
-fn turned(mesh: &TriMesh, draw: &Vec3, lines: usize, draft: f64, slack: f64) -> Direction {
-    let mut best = judge(mesh, draw, lines, draft);
+    let coarse = look(&draws, lines.min(COARSE))?;
+    let kept: Vec<Vec3> = coarse.iter().take(KEPT).map(|d| d.draw).collect();
+    let mut best = look(&kept, lines)?[0];
     for turn in TURNS {
         loop {
             let [u, v, _] = super::dexels::axes(&best.draw);
             let tilt = turn.to_radians().tan();
-            let next = [u, -u, v, -v, u + v, u - v, v - u, -u - v]
+            let around: Vec<Vec3> = [u, -u, v, -v, u + v, u - v, v - u, -u - v]
                 .iter()
-                .map(|t| judge(mesh, &(best.draw + tilt * t).normalize(), lines, draft))
-                .min_by(|a, b| a.compare(b, slack));
-            let Some(next) = next.filter(|next| next.compare(&best, slack) == Ordering::Less)
-            else {
+                .map(|t| (best.draw + tilt * t).normalize())
+                .collect();
+            let next = look(&around, lines)?[0];
+            if next.compare(&best, slack) != Ordering::Less {
                 break;
-            };
+            }
             best = next;
         }
     }
-    best
+    Ok(best)
 }
 
 /// What speaks against one direction.
