@@ -1,19 +1,31 @@
 //! Cost of feeding, feeder placement, solidification and the draw search, and how it grows.
 //!
 //! Run with `cargo bench --bench casting`; `-- small` leaves out the grid of 5 million cells. Prints seconds and, where the
-//! size grows, the cost relative to the smallest.
+//! size grows, the cost relative to the smallest. With `-- part.obj ...` it prints how far the best draw direction of each part
+//! lies from the best of 20,626 directions, which are a degree apart.
 
+use std::path::Path;
 use std::time::Instant;
+
+use rayon::prelude::*;
 
 use grassfire::Vec3;
 use grassfire::casting::feed::{FeedOptions, feed, place_feeders};
 use grassfire::casting::mould::best_direction;
+use grassfire::casting::mould::directions::{SLACK, judge, spiral};
 use grassfire::casting::solidify::{SolidifyOptions, solidify};
+use grassfire::io::{Input, ReadOptions, read_input};
 use grassfire::mesh::TriMesh;
 use grassfire::monitor::Monitor;
 use grassfire::skeleton::Skeleton;
 
 fn main() {
+    let given = std::env::args().skip(1);
+    let parts: Vec<String> = given.filter(|a| a.contains('.')).collect();
+    if !parts.is_empty() {
+        parts.iter().for_each(|part| draw_beside_all(part));
+        return;
+    }
     let small = std::env::args().any(|arg| arg == "small");
     feeding();
     placement();
@@ -134,6 +146,48 @@ fn draw_search() {
         clock.elapsed().as_secs_f64(),
         best.undercut
     );
+}
+
+/// Directions a degree apart on a half-space: 2 pi / (pi / 180)^2.
+const ALL: usize = 20_626;
+
+/// The search of `grassfire mould` beside all directions, with the same lines and the same order.
+fn draw_beside_all(part: &str) {
+    let read = read_input(
+        Path::new(part),
+        &ReadOptions::default(),
+        &Monitor::default(),
+    );
+    let Ok(Input::Mesh { mesh, .. }) = read else {
+        println!("{part}: not a mesh");
+        return;
+    };
+    let (lines, draft) = (128, 1.0);
+    let clock = Instant::now();
+    let found = best_direction(&mesh, 300, lines, draft, &Monitor::default()).expect("in time");
+    let searched = clock.elapsed().as_secs_f64();
+    let clock = Instant::now();
+    let slack = SLACK * mesh.volume().abs();
+    let all = spiral(ALL).into_par_iter();
+    let best = all.map(|draw| judge(&mesh, &draw, lines, draft));
+    let best = best.min_by(|a, b| a.compare(b, slack)).expect("some");
+    let angle = |a: &Vec3, b: &Vec3| a.dot(b).abs().min(1.0).acos().to_degrees();
+    println!(
+        "{part}: search {searched:.1} s, all {:.1} s, {:.2} degrees apart, search {:?} than all",
+        clock.elapsed().as_secs_f64(),
+        angle(&found.draw, &best.draw),
+        found.compare(&best, slack)
+    );
+    for direction in [found, best] {
+        let [x, y, z]: [f64; 3] = direction.draw.into();
+        println!(
+            "  ({x:.4}, {y:.4}, {z:.4}) undercut {:.0} mm3 in {}, flatness {:.2} mm, little draft {:.1} %",
+            direction.undercut,
+            direction.undercuts,
+            direction.flatness,
+            100.0 * direction.low_draft
+        );
+    }
 }
 
 fn freezing(across: &[u32]) {

@@ -11,6 +11,7 @@ mod construct;
 mod deliver;
 mod edits;
 mod error;
+mod even;
 mod exchange;
 mod feeding;
 mod fewest;

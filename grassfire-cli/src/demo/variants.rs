@@ -25,8 +25,6 @@ const DRAWN: &str = include_str!("../../../examples/wishbone/case.toml");
 /// The feeder stands on the boss, with a foot of 40 mm.
 const FEEDER: [f64; 3] = [112.0, 0.0, 15.0];
 const FOOT: f64 = 20.0;
-/// Cells of the freezing part, mm.
-const CELL: f64 = 2.0;
 /// Sand no thinner than the least wall of steel in sand, mm.
 const MIN_GAP: f64 = 6.0;
 
@@ -204,7 +202,6 @@ fn edited(mut case: Case, variant: &Variant) -> Case {
     options.mould.draw = Some([0.0, 0.0, 1.0]);
     options.mould.repair = variant.repair;
     options.solidify.feeders = vec![FEEDER];
-    options.solidify.cell.get_or_insert(CELL);
     if let Some(growth) = variant.growth {
         options.mould.min_gap = if variant.repair == Repair::Off {
             0.0

@@ -26,16 +26,32 @@ pub fn grow(
     cells: &TriMesh,
     growth: &[f64],
 ) -> VoxelGrid<f32> {
-    let most = growth.iter().copied().fold(0.0, f64::max);
-    let least = growth.iter().copied().fold(0.0, f64::min);
+    grow_by(field, surface, &[(cells, growth)])
+}
+
+/// [`grow`] by several growths at once, each of its own cells: they add up.
+pub fn grow_by(
+    field: &VoxelGrid<f32>,
+    surface: &TriMesh,
+    layers: &[(&TriMesh, &[f64])],
+) -> VoxelGrid<f32> {
+    let bound = |pick: fn(f64, f64) -> f64| -> f64 {
+        let each = layers.iter();
+        each.map(|l| l.1.iter().copied().fold(0.0, pick)).sum()
+    };
+    let [least, most] = [bound(f64::min), bound(f64::max)];
     if most <= 0.0 && least >= 0.0 {
         return field.clone();
     }
-    let places = Bvh::new(cells);
+    let places: Vec<Bvh> = layers.iter().map(|l| Bvh::new(l.0)).collect();
     let by = |p: &Vec3| {
-        let nearest = places.nearest(p, f64::INFINITY)?;
-        let corners = cells.triangles[nearest.triangle as usize];
-        Some(interpolate(cells, corners, &nearest.point, growth))
+        let each = layers.iter().zip(&places);
+        let found = each.map(|((cells, growth), places)| {
+            let nearest = places.nearest(p, f64::INFINITY)?;
+            let corners = cells.triangles[nearest.triangle as usize];
+            Some(interpolate(cells, corners, &nearest.point, growth))
+        });
+        found.sum()
     };
     moved(field, surface, [least, most], 2.0 * field.spacing, by)
 }
@@ -113,7 +129,7 @@ pub fn cells_of(skeleton: &Skeleton) -> TriMesh {
 }
 
 /// Value at `p` in a triangle, or on the segment that it is when its last two corners are one point.
-pub(super) fn interpolate(mesh: &TriMesh, corners: [u32; 3], p: &Vec3, values: &[f64]) -> f64 {
+pub(crate) fn interpolate(mesh: &TriMesh, corners: [u32; 3], p: &Vec3, values: &[f64]) -> f64 {
     let [a, b, c] = corners.map(|v| mesh.points[v as usize]);
     let [va, vb, vc] = corners.map(|v| values[v as usize]);
     let (u, v, w) = (b - a, c - a, p - a);
@@ -191,5 +207,18 @@ mod tests {
         );
         let at = grown.sample(&Vec3::new(0.0, 0.0, 3.0));
         assert!(at.abs() < 0.1, "{at}");
+    }
+
+    #[test]
+    fn two_growths_add_up() {
+        let (field, surface, skeleton) = plate();
+        let cells = cells_of(&skeleton);
+        let [one, other] = [[1.0, 3.0, 3.0, 1.0], [1.0, 1.0, 1.0, 1.0]];
+        let layers: [(&TriMesh, &[f64]); 2] = [(&cells, &one), (&cells, &other)];
+        let both = grow_by(&field, &surface, &layers);
+        let once = grow(&field, &surface, &cells, &[2.0, 4.0, 4.0, 2.0]);
+        assert_eq!(both.dims, once.dims);
+        let mut pairs = both.values.iter().zip(&once.values);
+        assert!(pairs.all(|(a, b)| (a - b).abs() < 1e-4));
     }
 }

@@ -4,13 +4,13 @@ use super::ReconstructOptions;
 use super::bodies::Bodies;
 use super::casting::drawn_out_again;
 use super::error::{PipelineError, StageError};
+use super::even;
 use super::follow;
 use super::record::Record;
 use super::shape::{Base, Shape};
 use crate::Vec3;
 use crate::casting::feed::{
-    self, Contact, Fed, FeedError, FeedGraph, FeedOn, FeedOptions, Monotony, area_factor, feed,
-    feed_graph, monotony,
+    self, Contact, Fed, FeedError, FeedOn, FeedOptions, Monotony, area_factor, feed, monotony,
 };
 use crate::edit::{cells_of, grow};
 use crate::medial::{self, MedialMesh};
@@ -19,7 +19,7 @@ use crate::monitor::Monitor;
 use crate::radii;
 use crate::remesh::{Capsule, RemeshError, RemeshOptions, Remeshed, remesh, remesh_density};
 use crate::report::{FeedBlock, FeederBlock, InfeasibleBlock};
-use crate::skeleton;
+use crate::skeleton::{self, Skeleton};
 use crate::voxel::VoxelGrid;
 
 /// A skeleton point touches a body when the body is nearer than this many radii.
@@ -29,8 +29,6 @@ const BELONGS: f64 = 0.5;
 /// A feeder stands on a body when that is nearer than this, mm, or than the feeder's radius.
 const STANDS: f64 = 1.0;
 
-/// Passes of smoothing that take the lattice's noise out of medial radii: every bump would be carried to the feeder.
-const SMOOTHING: usize = 4;
 /// Growth below this many voxels is left to the body's own radii.
 const LEAST_GROWTH: f64 = 0.5;
 
@@ -146,12 +144,8 @@ fn one_round(
                 (cells_of(&skeleton), radii, fed)
             }
             FeedOn::Medial => {
-                smooth(&mut axis.mesh);
-                let (points, radii) = (&axis.mesh.points, &axis.mesh.radii);
-                let contacts = contacts(bodies, points, radii, feeding, true);
-                let graph = FeedGraph::of_medial(&axis.mesh, &contacts);
-                let fed = feed_graph(&graph, &[], &contacts, feeding, monitor)?;
-                (cells(&axis.mesh), radii, fed)
+                let fed = even::balls_fed(&mut axis.mesh, bodies, options, monitor)?;
+                (cells(&axis.mesh), &axis.mesh.radii, fed)
             }
         };
         let growth: Vec<f64> = fed.radii.iter().zip(before).map(|(a, b)| a - b).collect();
@@ -167,26 +161,8 @@ fn one_round(
     })
 }
 
-/// Half-way to the mean of the neighbours, some times.
-fn smooth(mesh: &mut MedialMesh) {
-    let graph = FeedGraph::of_medial(mesh, &[]);
-    for _ in 0..SMOOTHING {
-        let mean = |v: usize| {
-            let around = graph.neighbours(v as u32);
-            let sum: f64 = around.iter().map(|n| mesh.radii[n.0 as usize]).sum();
-            let own = mesh.radii[v];
-            if around.is_empty() {
-                own
-            } else {
-                (own + sum / around.len() as f64) / 2.0
-            }
-        };
-        mesh.radii = (0..mesh.radii.len()).map(mean).collect();
-    }
-}
-
 /// Triangles of a medial mesh, its curves as triangles without area.
-fn cells(mesh: &MedialMesh) -> TriMesh {
+pub(super) fn cells(mesh: &MedialMesh) -> TriMesh {
     let mut triangles = mesh.triangles.clone();
     triangles.extend(mesh.edges.iter().map(|e| [e[0], e[1], e[1]]));
     TriMesh {
@@ -247,12 +223,13 @@ pub(super) type Followed = Result<Option<Remeshed>, StageError>;
 /// nothing has grown before.
 ///
 /// 1. The least radii ([`feed`]).
-/// 2. The proposal with this growth ([`reference`]). Where gaps close a body of the same skeleton would cut itself: then it
-///    stays as it is.
-/// 3. The body follows ([`follow`]); it stays as it is when it would not be sound.
+/// 2. The proposal with this growth ([`even::grown`]), or with more where balls of its medial axis count, too. Where gaps close a
+///    body of the same skeleton would cut itself: then it stays as it is.
+/// 3. The body follows ([`follow`]); where it would not be sound with what the balls ask for, it follows the skeleton alone, and
+///    it stays as it is when it would not be sound then either.
 ///
 /// # Errors
-/// As [`feed`], [`follow`] and [`reference`].
+/// As [`feed`], [`follow`] and [`even::grown`].
 pub(super) fn fed(
     record: &mut Record,
     shape: Shape,
@@ -268,51 +245,57 @@ pub(super) fn fed(
     }
     let before = &shape.skeleton.skeleton;
     let quiet = Monitor::default();
-    let fed = record.stage("feed", || {
+    let on_skeleton = |skeleton: &Skeleton| {
         // In a design part the bodies are not part of the skeleton: members only run on into their walls.
         let inside = base.united.is_none();
-        let contacts = contacts(bodies, &before.points, &before.radii, feeding, inside);
-        feed(before, &contacts, feeding, &quiet)
-    })?;
-    let growth = fed.radii.iter().zip(&before.radii).map(|(a, b)| a - b);
-    let growth: Vec<f64> = growth.collect();
-    let most = growth.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
-    if most <= 0.0 {
-        tell_report(record, &fed, options, first);
+        let contacts = contacts(bodies, &skeleton.points, &skeleton.radii, feeding, inside);
+        feed(skeleton, &contacts, feeding, &quiet)
+    };
+    let least = record.stage("feed", || on_skeleton(before))?;
+    let growth = least.radii.iter().zip(&before.radii).map(|(a, b)| a - b);
+    let most = growth.fold(0.0_f64, |m, g| m.max(g.abs()));
+    if most <= 0.0 && feeding.on == FeedOn::Skeleton {
+        tell_report(record, &least, options, first);
         return Ok((shape, Ok(None)));
     }
-    let (grown, why) = record.stage("feed", || {
-        let target = follow::target(base, &shape, &growth);
-        let grown = follow::reference(&target, whole, &shape, &growth, bodies, options, &quiet)?;
-        Ok::<_, StageError>(if follow::same_topology(&grown, whole) {
-            (Some(grown), CUTS)
-        } else {
-            (None, CLOSES)
-        })
-    })?;
-    let edited = match grown {
-        None => None,
-        Some(grown) => record
-            .stage("fit", || {
-                follow::follow(&shape, base, &fed.radii, options, &quiet)
-            })?
-            .map(|edited| (edited, grown)),
+    let site = even::Site {
+        shape: &shape,
+        base,
+        whole,
+        bodies,
+        options,
     };
-    let told = tell_report(record, &fed, options, first);
-    let Some((edited, grown)) = edited else {
-        told.violations = fed.violations_before;
-        told.shortfall = most;
-        return Ok((
-            shape,
-            Err(StageError::Growth {
-                most,
-                broken: fed.violations_before,
-                rules: fed.rules,
-                why,
-            }),
-        ));
+    let mut ways = vec![FeedOn::Skeleton];
+    if feeding.on == FeedOn::Medial && !feeding.neutral {
+        ways.insert(0, FeedOn::Medial);
+    }
+    let mut why = CLOSES;
+    for on in ways {
+        let grown = record.stage("feed", || {
+            even::grown(&site, least.clone(), on, on_skeleton, &quiet)
+        })?;
+        let Some(even::Grown { fed, growth, solid }) = grown else {
+            continue;
+        };
+        let edited = record.stage("fit", || {
+            follow::follow(&shape, base, &fed.radii, &growth, options, &quiet)
+        })?;
+        if let Some(edited) = edited {
+            tell_report(record, &fed, options, first);
+            return Ok((edited, Ok(Some(solid))));
+        }
+        why = CUTS;
+    }
+    let told = tell_report(record, &least, options, first);
+    told.violations = least.violations_before;
+    told.shortfall = most;
+    let error = StageError::Growth {
+        most,
+        broken: least.violations_before,
+        rules: least.rules,
+        why,
     };
-    Ok((edited, Ok(Some(grown))))
+    Ok((shape, Err(error)))
 }
 
 /// Puts what the body's own skeleton says into the report, as if its radii can be had.
@@ -416,7 +399,7 @@ pub(super) fn belonging(bodies: &Bodies, points: &[Vec3], radii: &[f64]) -> Vec<
 }
 
 /// How the bodies touch balls of a skeleton or medial axis, one contact a body.
-fn contacts(
+pub(super) fn contacts(
     bodies: &Bodies,
     points: &[Vec3],
     radii: &[f64],

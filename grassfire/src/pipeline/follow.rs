@@ -7,8 +7,9 @@ use super::bodies::Bodies;
 use super::error::StageError;
 use super::feeding::{keep_free, solid_of};
 use super::shape::{Base, Shape};
-use crate::edit::{apply_radii, cells_of, grow};
+use crate::edit::{apply_radii, cells_of, grow, grow_by};
 use crate::fit::{FitOptions, fit};
+use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
 use crate::remesh::Remeshed;
 use crate::skeleton;
@@ -20,13 +21,55 @@ const STEP: f64 = 4.0;
 /// Most steps.
 const MOST_STEPS: usize = 4;
 
-/// The field that bodies are fitted to, moved by the change of the radii of the shape's skeleton.
-pub(super) fn target(base: &Base, shape: &Shape, growth: &[f64]) -> VoxelGrid<f32> {
-    let cells = cells_of(&shape.skeleton.skeleton);
-    grow(base.target, base.remeshed.solid.mesh(), &cells, growth)
+/// By how much a proposal grows.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Growth {
+    /// Around every point of a shape's skeleton, mm.
+    pub(super) skeleton: Vec<f64>,
+    /// Besides, around the balls of medial axes.
+    pub(super) balls: Vec<Balls>,
 }
 
-/// The shape with new `radii`; none when its body would cut itself or fold over.
+/// Growth around the balls of a medial axis.
+#[derive(Debug, Clone)]
+pub(super) struct Balls {
+    /// Its triangles, and its curves as triangles without area.
+    pub(super) cells: TriMesh,
+    /// mm, one a point.
+    pub(super) growth: Vec<f64>,
+}
+
+impl Growth {
+    /// A share of it.
+    fn times(&self, share: f64) -> Self {
+        let scaled = |values: &[f64]| values.iter().map(|x| share * x).collect();
+        let balls = self.balls.iter().map(|balls| Balls {
+            cells: balls.cells.clone(),
+            growth: scaled(&balls.growth),
+        });
+        Self {
+            skeleton: scaled(&self.skeleton),
+            balls: balls.collect(),
+        }
+    }
+
+    /// The largest change, mm.
+    fn most(&self) -> f64 {
+        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let balls = self.balls.iter().map(|b| largest(&b.growth));
+        largest(&self.skeleton) + balls.sum::<f64>()
+    }
+}
+
+/// The field that bodies are fitted to, moved by a growth.
+pub(super) fn target(base: &Base, shape: &Shape, growth: &Growth) -> VoxelGrid<f32> {
+    let cells = cells_of(&shape.skeleton.skeleton);
+    let mut layers: Vec<(&TriMesh, &[f64])> = vec![(&cells, &growth.skeleton)];
+    layers.extend(growth.balls.iter().map(|b| (&b.cells, &b.growth[..])));
+    grow_by(base.target, base.remeshed.solid.mesh(), &layers)
+}
+
+/// The shape with new `radii`, fitted to the target with its `growth`; none when its body would cut itself or fold over.
 ///
 /// The growth is taken in equal steps of a few voxels. In each the target moves ([`target`]), every offset of the last fitted
 /// body is scaled ([`apply_radii`]), and the scaled body is fitted, which also untangles it.
@@ -37,20 +80,19 @@ pub(super) fn follow(
     shape: &Shape,
     base: &Base,
     radii: &[f64],
+    growth: &Growth,
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Option<Shape>, StageError> {
     let first = &shape.skeleton.skeleton.radii;
-    let change = |v: usize| radii[v] - first[v];
-    let most = (0..radii.len()).fold(0.0_f64, |m, v| m.max(change(v).abs()));
-    let steps = (most / (STEP * base.target.spacing)).ceil();
+    let steps = (growth.most() / (STEP * base.target.spacing)).ceil();
     let steps = (steps as usize).clamp(1, MOST_STEPS);
     let mut now = shape.clone();
     for step in 1..=steps {
         let part = step as f64 / steps as f64;
-        let growth: Vec<f64> = (0..radii.len()).map(|v| part * change(v)).collect();
-        let grown: Vec<f64> = first.iter().zip(&growth).map(|(r, g)| r + g).collect();
-        let target = target(base, shape, &growth);
+        let radii = first.iter().zip(radii);
+        let grown: Vec<f64> = radii.map(|(r, new)| r + part * (new - r)).collect();
+        let target = target(base, shape, &growth.times(part));
         now = fitted(now, grown, &target, base, options, monitor)?;
         if !now.sound() {
             return Ok(None);
@@ -104,12 +146,12 @@ pub(super) fn reference(
     target: &VoxelGrid<f32>,
     whole: &Remeshed,
     shape: &Shape,
-    growth: &[f64],
+    growth: &Growth,
     bodies: &Bodies,
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<Remeshed, StageError> {
-    let thinning: Vec<f64> = growth.iter().map(|g| g.min(0.0)).collect();
+    let thinning: Vec<f64> = growth.skeleton.iter().map(|g| g.min(0.0)).collect();
     let cells = cells_of(&shape.skeleton.skeleton);
     let thinned = grow(&whole.field, whole.solid.mesh(), &cells, &thinning);
     let value = |(v, &grown): (usize, &f32)| {

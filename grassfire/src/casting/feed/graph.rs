@@ -59,6 +59,8 @@ pub struct FeedGraph {
     start: Vec<u32>,
     /// Neighbour and length, by point.
     neighbours: Vec<(u32, f64)>,
+    /// Ends of the links, ascending.
+    links: Vec<[u32; 2]>,
 }
 
 impl FeedGraph {
@@ -142,9 +144,11 @@ impl FeedGraph {
         self.index();
         let pieces = self.pieces();
         for contact in contacts {
-            let links = self.links(&contact.touching, &pieces);
+            let links = self.shortest_links(&contact.touching, &pieces);
+            self.links.extend(&links);
             self.add(links, EdgeKind::Link);
         }
+        self.links.sort_unstable();
         self.index();
         self
     }
@@ -166,7 +170,7 @@ impl FeedGraph {
     }
 
     /// The shortest link between every two pieces among points that touch one body.
-    fn links(&self, touching: &[u32], piece: &[u32]) -> Vec<[u32; 2]> {
+    fn shortest_links(&self, touching: &[u32], piece: &[u32]) -> Vec<[u32; 2]> {
         let mut best: BTreeMap<[u32; 2], (f64, [u32; 2])> = BTreeMap::new();
         for (i, &a) in touching.iter().enumerate() {
             for &b in &touching[i + 1..] {
@@ -221,6 +225,11 @@ impl FeedGraph {
     /// Neighbours of `v` and the lengths of the edges to them.
     pub fn neighbours(&self, v: u32) -> &[(u32, f64)] {
         &self.neighbours[self.start[v as usize] as usize..self.start[v as usize + 1] as usize]
+    }
+
+    /// Whether metal flows from `v` to its neighbour `w` through a non-design body.
+    pub fn is_link(&self, v: u32, w: u32) -> bool {
+        self.links.binary_search(&sorted(v, w)).is_ok()
     }
 
     /// Metal around point `v` when its radius is `r`, mm3: sheets `2 r A`, beams `pi r^2 L`, rims a half cylinder.

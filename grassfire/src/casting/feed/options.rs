@@ -34,7 +34,8 @@ pub enum FeedOn {
     /// The quad skeleton: sheets and beams, junctions left out.
     #[default]
     Skeleton,
-    /// The medial axis: every inscribed ball, also those of junctions and blocks, which ask for much more metal.
+    /// The skeleton, and every inscribed ball of the medial axis, too, also those of junctions and of waves between the points of
+    /// the skeleton: balls hardly shrink anywhere on the way then, for more metal.
     Medial,
 }
 

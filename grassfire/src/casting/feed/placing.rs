@@ -7,13 +7,17 @@ use super::error::FeedError;
 use super::graph::{Contact, FeedGraph, Seed, distances};
 use super::options::{FeedMode, FeedOptions};
 use super::rules::{Rules, contradiction};
-use super::sizing::feeder_size;
+use super::sizing::{FeedZone, feeder_size};
 use super::{check, shape};
 use crate::monitor::Monitor;
 use crate::skeleton::Skeleton;
 
 /// As many sets are all tried.
 const ALL: usize = 1000;
+/// Sets that are worked out at once, before those left are compared with the best: the same on any number of threads.
+const AT_ONCE: usize = 32;
+/// Rounding of bounds, as a share.
+const ROUNDING: f64 = 1e-9;
 
 /// A set of feeders and what it costs.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -39,6 +43,9 @@ impl Placement {
 /// 1. One feeder: every candidate is tried; likewise every set of more feeders where there are at most a thousand.
 /// 2. Else the best one more is added to those chosen so far; then, as long as that saves metal, one of them is moved to
 ///    the best other candidate. The result is at least as good as every single exchange, not always the best of all sets.
+/// 3. Of many sets each gets a lower bound first: sections grow along the shortest ways at least, and the feeders are as large
+///    as the moduli at their feet ask for then. Sets are worked out in the order of their bounds, until those left cannot be
+///    better.
 ///
 /// Places that do not reach all of the part cost infinitely much. O(candidates * count * E log V) a round; the result does
 /// not depend on the number of threads.
@@ -57,10 +64,12 @@ pub fn place_feeders(
     if count == 0 || candidates.is_empty() || options.mode == FeedMode::Direction {
         return Err(FeedError::NoFeeder);
     }
+    let graph = FeedGraph::new(skeleton, contacts);
     let site = Site {
-        graph: FeedGraph::new(skeleton, contacts),
+        rules: Rules::bare(&graph, contacts, options),
+        factors: graph.shape_factors(),
+        graph,
         skeleton,
-        contacts,
         options,
     };
     let sets = sets(candidates, count);
@@ -72,17 +81,18 @@ pub fn place_feeders(
     } else {
         best = site.cheapest(&sets, monitor)?;
     }
-    let mut moved = count > 1 && sets.is_empty();
-    while moved {
-        moved = false;
-        for k in 0..count {
-            let mut rest = best.points.clone();
-            rest.remove(k);
-            let other = site.extended(&rest, candidates, monitor)?;
-            if other.cost() < best.cost() * (1.0 - 1e-9) {
-                best = other;
-                moved = true;
-            }
+    // The one chosen last is the best beside the others; then each in turn is looked at, the oldest first.
+    let mut kept = 1;
+    while sets.is_empty() && kept < count {
+        let mut rest = best.points.clone();
+        rest.remove(0);
+        let other = site.extended(&rest, candidates, monitor)?;
+        if other.cost() < best.cost() * (1.0 - ROUNDING) {
+            best = other;
+            kept = 1;
+        } else {
+            best.points.rotate_left(1);
+            kept += 1;
         }
     }
     if !best.cost().is_finite() {
@@ -95,7 +105,10 @@ pub fn place_feeders(
 struct Site<'a> {
     graph: FeedGraph,
     skeleton: &'a Skeleton,
-    contacts: &'a [Contact],
+    /// Without arcs.
+    rules: Rules,
+    /// Modulus over radius.
+    factors: Vec<f64>,
     options: &'a FeedOptions,
 }
 
@@ -115,50 +128,80 @@ impl Site<'_> {
         self.cheapest(&extended.collect::<Vec<_>>(), monitor)
     }
 
-    /// The set that costs least.
+    /// The set that costs least; of equal ones the first.
     fn cheapest(&self, sets: &[Vec<u32>], monitor: &Monitor) -> Result<Placement, FeedError> {
-        let tried = sets.par_iter().map(|points| {
+        let bounds = sets.par_iter().map(|points| {
             monitor.check()?;
-            self.cost(points.clone())
+            Ok(self.least_cost(points))
         });
-        let tried: Vec<Placement> = tried.collect::<Result<_, FeedError>>()?;
-        let unreached = |p: &Placement| (p.cost(), p.feeders);
-        let best = tried.into_iter().min_by(|a, b| {
-            let (a, b) = (unreached(a), unreached(b));
-            a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
-        });
-        Ok(best.unwrap_or_default())
+        let bounds: Vec<f64> = bounds.collect::<Result<_, FeedError>>()?;
+        let mut order: Vec<usize> = (0..sets.len()).collect();
+        order.sort_by(|&a, &b| bounds[a].total_cmp(&bounds[b]));
+        let mut best: Option<(usize, Placement)> = None;
+        // Of places that do not reach all of the part, the one that misses least: the next feeder can reach the rest.
+        let key = |(set, placed): &(usize, Placement)| (placed.cost(), placed.feeders, *set);
+        for some in order.chunks(AT_ONCE) {
+            let enough = best.as_ref().map_or(f64::INFINITY, |b| b.1.cost());
+            if bounds[some[0]] * (1.0 - ROUNDING) > enough {
+                break;
+            }
+            let tried = some.par_iter().map(|&set| {
+                monitor.check()?;
+                Ok((set, self.placed(sets[set].clone())?))
+            });
+            let tried: Vec<(usize, Placement)> = tried.collect::<Result<_, FeedError>>()?;
+            best = best.into_iter().chain(tried).min_by(|a, b| {
+                let (a, b) = (key(a), key(b));
+                let equal = a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1));
+                equal.then(a.2.cmp(&b.2))
+            });
+        }
+        Ok(best.map(|b| b.1).unwrap_or_default())
     }
 
-    fn cost(&self, points: Vec<u32>) -> Result<Placement, FeedError> {
+    /// No set with these points costs less; infinite where they do not reach all of the part.
+    fn least_cost(&self, points: &[u32]) -> f64 {
+        let graph = &self.graph;
+        let distances = distances(graph, &seeds(points));
+        if distances.distance.iter().any(|d| !d.is_finite()) {
+            return f64::INFINITY;
+        }
+        let slope = self.options.slope();
+        let values = self.rules.raised_along_ways(graph, &distances, slope);
+        let radii = self.rules.radii(&values);
+        let feeders = points.iter().map(|&foot| {
+            let foot = foot as usize;
+            let zone = FeedZone {
+                modulus: self.factors[foot] * radii[foot],
+                ..FeedZone::default()
+            };
+            feeder_size(&zone).volume
+        });
+        graph.volume(&radii) - graph.volume(&graph.radii) + feeders.sum::<f64>()
+    }
+
+    fn placed(&self, points: Vec<u32>) -> Result<Placement, FeedError> {
         let graph = &self.graph;
         let distances = distances(graph, &seeds(&points));
         let missed = distances.distance.iter().filter(|d| !d.is_finite());
         let missed = missed.count();
         if missed > 0 {
-            // The fewer points are missed the better, so that the next feeder can reach the rest.
             return Ok(Placement {
                 points,
                 added: f64::INFINITY,
                 feeders: missed as f64,
             });
         }
-        let rules = Rules::new(
-            graph,
-            &self.skeleton.quads,
-            self.contacts,
-            &distances,
-            self.options,
-        );
+        let quads = &self.skeleton.quads;
+        let rules = self.rules.towards(graph, quads, &distances, self.options);
         let least = rules.raise().map_err(|c| contradiction(graph, &c))?;
         let radii = rules.radii(&least.values);
         let added = graph.volume(&radii) - graph.volume(&graph.radii);
-        let factors = graph.shape_factors();
         let feeders = points.iter().enumerate().map(|(number, &foot)| {
             let own = |v: &usize| distances.feeder[*v] == number as u32;
             let zone: Vec<usize> = (0..radii.len()).filter(own).collect();
             let foot = foot as usize;
-            let modulus = factors[foot] * radii[foot];
+            let modulus = self.factors[foot] * radii[foot];
             feeder_size(&shape(graph, &zone, &radii, modulus)).volume
         });
         let feeders = feeders.sum();

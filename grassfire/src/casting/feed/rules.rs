@@ -38,6 +38,11 @@ impl Rules {
         distances: &Distances,
         options: &FeedOptions,
     ) -> Self {
+        Self::bare(graph, contacts, options).towards(graph, quads, distances, options)
+    }
+
+    /// Bounds and fixed points, which do not depend on where feeders stand; no arcs.
+    pub fn bare(graph: &FeedGraph, contacts: &[Contact], options: &FeedOptions) -> Self {
         let n = graph.points.len();
         let mut rules = Self {
             factors: factors(graph, options),
@@ -51,6 +56,18 @@ impl Rules {
                 .for_each(|&v| rules.fixed[v as usize] = true);
         }
         rules.bounds(graph, options);
+        rules
+    }
+
+    /// The same with the arcs towards feeders.
+    pub fn towards(
+        &self,
+        graph: &FeedGraph,
+        quads: &[[u32; 4]],
+        distances: &Distances,
+        options: &FeedOptions,
+    ) -> Self {
+        let mut rules = self.clone();
         let slope = options.slope();
         let finite = |d: f64| if d.is_finite() { slope * d } else { 0.0 };
         rules.potential = distances.distance.iter().map(|&d| finite(d)).collect();
@@ -144,6 +161,28 @@ impl Rules {
     pub fn raise(&self) -> Result<Least, Cycle> {
         let lower: Vec<f64> = zip(&self.base, &self.least, f64::max);
         least_solution(&lower, &self.arcs, &self.potential)
+    }
+
+    /// Lower bounds of the values of [`Rules::raise`]: those that the shortest ways alone ask for, each once from its far end.
+    /// Rules without arcs will do. O(V log V).
+    pub fn raised_along_ways(
+        &self,
+        graph: &FeedGraph,
+        distances: &Distances,
+        slope: f64,
+    ) -> Vec<f64> {
+        let mut values: Vec<f64> = zip(&self.base, &self.least, f64::max);
+        let far = |v: usize| distances.distance[v];
+        let mut order: Vec<usize> = (0..values.len()).collect();
+        order.sort_unstable_by(|&a, &b| far(b).total_cmp(&far(a)));
+        for v in order {
+            let next = distances.parent[v] as usize;
+            let drop = far(v) - far(next);
+            if drop > LEVEL && !self.fixed[next] && !graph.is_link(v as u32, next as u32) {
+                values[next] = values[next].max(values[v] + slope * drop);
+            }
+        }
+        values
     }
 
     /// Values that keep to the rules, change as little as possible at most (in the maximum norm), and keep

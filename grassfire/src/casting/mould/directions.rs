@@ -30,7 +30,7 @@ pub struct Direction {
 impl Direction {
     /// Less undercut first (volumes within `slack` mm3 count as equal), then fewer, then a flatter parting line, then more
     /// draft.
-    fn compare(&self, other: &Self, slack: f64) -> Ordering {
+    pub fn compare(&self, other: &Self, slack: f64) -> Ordering {
         let step = |d: &Self| (d.undercut / slack).round();
         let few = |d: &Self| if step(d) == 0.0 { 0 } else { d.undercuts };
         step(self)
@@ -48,7 +48,7 @@ const KEPT: usize = 12;
 /// Turns tried around the best, degrees.
 const TURNS: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
 /// Undercuts below this share of the part's volume are the lattice's.
-const SLACK: f64 = 2e-4;
+pub const SLACK: f64 = 2e-4;
 
 /// The direction along which a two-part mould opens best.
 ///
@@ -114,8 +114,8 @@ pub fn judge(mesh: &TriMesh, draw: &Vec3, lines: usize, draft: f64) -> Direction
     }
 }
 
-/// Evenly spread unit vectors with z > 0.
-fn spiral(count: usize) -> Vec<Vec3> {
+/// Evenly spread unit vectors with z > 0 (a Fibonacci spiral).
+pub fn spiral(count: usize) -> Vec<Vec3> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     (0..count)
         .map(|i| {

@@ -1,5 +1,6 @@
 //! Solidification of a casting in sand: when everything freezes, and what stays cut off from the feeders.
 
+mod cells;
 mod checks;
 mod chvorinov;
 mod error;
@@ -21,7 +22,7 @@ pub use hot_spots::HotSpot;
 pub use materials::{Metal, MetalName, Sand, SandName, Table, lookup};
 
 use crate::Vec3;
-use crate::mesh::{Bvh, TriMesh};
+use crate::mesh::{Bvh, TriMesh, Winding};
 use crate::monitor::Monitor;
 use crate::remesh::{RemeshOptions, remesh};
 use crate::voxel::VoxelGrid;
@@ -46,7 +47,8 @@ pub struct SolidifyOptions {
     pub metal: Option<Metal>,
     /// A sand of your own in place of `sand`.
     pub mould: Option<Sand>,
-    /// Edge of a cell, mm; without it the longest side of the part has 110 cells.
+    /// Edge of a cell, mm; without it a quarter of a thin wall and at most a 110th of the part's longest side, as far as four
+    /// million cells go.
     pub cell: Option<f64>,
     /// Sand around the part, mm; without it as thick as heat gets while the part freezes.
     pub padding: Option<f64>,
@@ -130,9 +132,6 @@ pub struct Solidification {
     pub feeders: Vec<(Vec3, f64)>,
 }
 
-/// Longest side of a part in cells, when the cell is not given.
-const ACROSS: f64 = 110.0;
-
 /// Computes how the casting `mesh` freezes in sand.
 ///
 /// 1. The casting and its feeders (cylinders on necks) become signed distances on a grid of even cells ([`remesh`]);
@@ -157,30 +156,13 @@ pub fn solidify(
     let (metal, sand) = materials(options)?;
     check(options)?;
     monitor.step(STAGE, "grid", 0.0)?;
-    let mut field = distances(mesh, options, monitor)?;
     let laws = Laws::new(&metal, &sand);
-    let thick = deepest_wall(&field);
-    let feeders = add_feeders(&mut field, mesh, thick, options)?;
-    let widest = feeders.iter().fold(thick, |m, f| m.max(f.1 / 6.0));
-    let expected = plate_time(&metal, &sand, widest);
-    let least = padding(&sand, 0.05 * expected);
-    let wanted = padding(&sand, expected);
-    let padding = options.padding.unwrap_or(wanted);
-    if padding < least {
-        return Err(SolidifyError::Mould { padding, least });
-    }
-    let inside = |p: &Vec3| feeders.iter().any(|f| in_feeder(p, f, &up(options)));
-    let part = Bvh::new(mesh);
-    let winding = crate::mesh::Winding::new(&part);
-    let grid = Grid::new(&field, padding, |p| inside(p) && winding.at(p) < 0.5);
-    let cells = grid.cells.len();
-    if cells > options.max_cells {
-        return Err(SolidifyError::TooMany {
-            cell: field.spacing,
-            cells,
-            limit: options.max_cells,
-        });
-    }
+    let Ground {
+        field,
+        grid,
+        feeders,
+        expected,
+    } = ground(mesh, &metal, &sand, options, monitor)?;
     let history = march::march(
         &grid,
         &laws,
@@ -200,20 +182,79 @@ pub fn solidify(
     Ok(out)
 }
 
-/// Signed distances of the part on its cells.
-fn distances(
+/// What is frozen.
+struct Ground {
+    /// Signed distances of part and feeders on the even cells.
+    field: VoxelGrid<f32>,
+    /// The same with the sand.
+    grid: Grid,
+    /// Feet and diameters, mm.
+    feeders: Vec<(Vec3, f64)>,
+    /// When a plate as thick as the thickest section would be solid, s.
+    expected: f64,
+}
+
+/// As often a grid is laid: the sand's layers do not get fewer as fast as the cells get coarser.
+const ROUNDS: usize = 5;
+
+/// Lays the grid, with coarser cells where it would take more than its budget and the cell was not given.
+fn ground(
     mesh: &TriMesh,
+    metal: &Metal,
+    sand: &Sand,
     options: &SolidifyOptions,
     monitor: &Monitor,
+) -> Result<Ground, SolidifyError> {
+    let limit = options.max_cells;
+    let budget = limit.min(cells::BUDGET);
+    let given = options.cell;
+    let mut cell = given.unwrap_or_else(|| cells::default_cell(mesh, budget));
+    let part = Bvh::new(mesh);
+    let winding = Winding::new(&part);
+    let mut rounds = 0;
+    loop {
+        rounds += 1;
+        let mut field = distances(mesh, cell, limit, monitor)?;
+        let thick = deepest_wall(&field);
+        let feeders = add_feeders(&mut field, mesh, thick, options)?;
+        let widest = feeders.iter().fold(thick, |m, f| m.max(f.1 / 6.0));
+        let expected = plate_time(metal, sand, widest);
+        let least = padding(sand, 0.05 * expected);
+        let padding = options.padding.unwrap_or(padding(sand, expected));
+        if padding < least {
+            return Err(SolidifyError::Mould { padding, least });
+        }
+        let inside = |p: &Vec3| feeders.iter().any(|f| in_feeder(p, f, &up(options)));
+        let grid = Grid::new(&field, padding, |p| inside(p) && winding.at(p) < 0.5);
+        let cells = grid.cells.len();
+        if given.is_none() && cells > budget && rounds < ROUNDS {
+            cell = cells::coarser(cell, cells as f64, budget);
+        } else if cells > limit {
+            return Err(SolidifyError::TooMany { cell, cells, limit });
+        } else {
+            return Ok(Ground {
+                field,
+                grid,
+                feeders,
+                expected,
+            });
+        }
+    }
+}
+
+/// Signed distances of the part on its cells, at most `limit`.
+fn distances(
+    mesh: &TriMesh,
+    cell: f64,
+    limit: usize,
+    monitor: &Monitor,
 ) -> Result<VoxelGrid<f32>, SolidifyError> {
-    let longest = mesh.bounds().map_or(1.0, |(lo, hi)| (hi - lo).max());
-    let cell = options.cell.unwrap_or(longest / ACROSS);
     let remeshed = remesh(
         mesh,
         &RemeshOptions {
             voxel: Some(cell),
             min_tunnel: 0.0,
-            max_voxels: options.max_cells,
+            max_voxels: limit,
             ..RemeshOptions::default()
         },
         monitor,
