@@ -19,6 +19,11 @@ const ROUNDS: u32 = 4;
 const TRIES: u32 = 6;
 /// Fairness against data of refined meshes, as a share of that of the first.
 const FAIRNESS: f64 = 0.25;
+/// A strip with more than this share of the residual may have the quads of later passes, too.
+const MAJOR: f64 = 1.0 / 3.0;
+/// Passes more for bodies that are still rough, as long as they have few quads.
+const MORE_PASSES: u32 = 2;
+const FEW_QUADS: f64 = 2000.0;
 
 /// A body with its system and the control points so far.
 pub(super) struct State<'a> {
@@ -33,11 +38,14 @@ pub(super) struct State<'a> {
 ///
 /// 1. Every quad has a residual, shared between its two directions ([`Residual`]); a strip's is the sum over its quads.
 /// 2. Strips with the largest residual an area are chosen, as long as it is above the goal and there may be more quads.
-///    Where the surface is close on the whole, only strips through places that are too far off count.
+///    Where the surface is close on the whole, only strips through places that are too far off count. A strip that has more
+///    than a third of the residual and is too long for a pass may use up the quads of all passes: it runs through the whole
+///    body, and without it short strips gain little.
 /// 3. They are split, and the control points found whose limit surface passes through the old one's. Strips that would
 ///    make it cut itself or fold there are left alone.
 /// 4. Some rounds with little fairness at the volume of f > 0, each step shortened where it would make the body worse.
 /// 5. The pass is kept when the distance falls and the body is still sound; else it was the last one.
+/// 6. Bodies of few quads that are still rough get up to two passes more.
 pub(super) fn refine<'a>(
     mut state: State<'a>,
     skeleton: &Skeleton,
@@ -48,16 +56,30 @@ pub(super) fn refine<'a>(
     let first = state.body.mesh.quads.len() as f64;
     let goal = Goal::of(options);
     let mut before = Figures::of(&state.solver, &state.points, fitted.iso_volume);
-    for pass in 0..options.refinements {
-        let part = f64::from(pass) / f64::from(options.refinements);
+    let most_of = |passes: u32| {
+        let growth = f64::from(passes) / f64::from(options.refinements);
+        first * options.most_quads.powf(growth)
+    };
+    let passes = match options.refinements {
+        0 => 0,
+        some => some + MORE_PASSES,
+    };
+    for pass in 0..passes {
+        let part = f64::from(pass) / f64::from(passes);
         monitor.step(STAGE, "refining", 0.75 + 0.15 * part)?;
-        if goal.met(&before) {
+        let more = pass >= options.refinements;
+        if goal.met(&before) || more && !goal.rough(&before) {
             break;
         }
         // Where the surface is close on the whole, only single places count.
         let beyond = if goal.close(&before) { goal.max } else { 0.0 };
-        let growth = f64::from(pass + 1) / f64::from(options.refinements);
-        let most = (first * options.most_quads.powf(growth)) as usize;
+        let (most, last) = if more {
+            let most = most_of(pass + 1).min(FEW_QUADS);
+            (most, most)
+        } else {
+            (most_of(pass + 1), first * options.most_quads)
+        };
+        let most = [most, last].map(|quads| quads as usize);
         let Some(mut finer) = finer(&state, skeleton, &goal, beyond, most)? else {
             break;
         };
@@ -98,7 +120,7 @@ fn finer<'a>(
     skeleton: &Skeleton,
     goal: &Goal,
     beyond: f64,
-    most: usize,
+    most: [usize; 2],
 ) -> Result<Option<State<'a>>, FitError> {
     let solver = &state.solver;
     let strips = Strips::new(&solver.surface.coarse);
@@ -144,13 +166,13 @@ fn finer<'a>(
     Ok(None)
 }
 
-/// The strips to split, so that there are at most `most` quads.
+/// The strips to split, so that there are at most `most` quads, or `last` with one that has most of the residual.
 fn choose(
     strips: &Strips,
     residual: &Residual,
     closed: &[u32],
     goal: &Goal,
-    most: usize,
+    [most, last]: [usize; 2],
 ) -> Vec<bool> {
     let mut energy = vec![0.0; strips.count];
     let mut area = vec![0.0; strips.count];
@@ -174,13 +196,71 @@ fn choose(
     let worth = |s: &usize| open[*s] && density(*s) > goal.rms.powi(2);
     let mut order: Vec<usize> = (0..strips.count).filter(worth).collect();
     order.sort_by(|&a, &b| density(b).total_cmp(&density(a)).then(a.cmp(&b)));
-    let mut chosen = vec![false; strips.count];
-    let mut total = residual.energy.len();
-    for s in order {
-        if total + quads[s] <= most {
+    let old = residual.energy.len();
+    let major = MAJOR * energy.iter().sum::<f64>();
+    let chosen = fill(&order, &quads, vec![false; strips.count], [old, most]);
+    let left_out = |&&s: &&usize| {
+        !chosen[s] && energy[s] > major && (old + 1..=last).contains(&(old + quads[s]))
+    };
+    let Some(&s) = order.iter().find(left_out) else {
+        return chosen;
+    };
+    let mut alone = vec![false; strips.count];
+    alone[s] = true;
+    fill(&order, &quads, alone, [old + quads[s], most])
+}
+
+/// Chooses more strips in turn, those that fit in below `most` quads.
+fn fill(
+    order: &[usize],
+    quads: &[usize],
+    mut chosen: Vec<bool>,
+    [mut total, most]: [usize; 2],
+) -> Vec<bool> {
+    for &s in order {
+        if !chosen[s] && total + quads[s] <= most {
             total += quads[s];
             chosen[s] = true;
         }
     }
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spline::catmull_clark::QuadTopology;
+
+    /// A torus of `n` rings of `m` quads.
+    fn torus(n: u32, m: u32) -> Strips {
+        let v = |i: u32, j: u32| (i % n) * m + j % m;
+        let quads: Vec<[u32; 4]> = (0..n * m)
+            .map(|q| (q / m, q % m))
+            .map(|(i, j)| [v(i, j), v(i + 1, j), v(i + 1, j + 1), v(i, j + 1)])
+            .collect();
+        let topology = QuadTopology::new((n * m) as usize, &quads);
+        Strips::new(&topology.expect("closed and oriented"))
+    }
+
+    #[test]
+    fn a_long_strip_with_most_of_the_residual_was_never_split() {
+        // Four rings of 40 quads, crossed by forty strips of four. The first ring has most of the residual, but not by area.
+        let strips = torus(4, 40);
+        let mut residual = Residual {
+            energy: vec![1.0; 160],
+            area: vec![1.0; 160],
+            along: vec![0.0; 160],
+        };
+        residual.energy[..40].fill(30.0);
+        residual.along[..40].fill(1.0);
+        residual.energy[45] = 500.0;
+        let goal = Goal::of(&FitOptions::default());
+        let ring = strips.across(0, 0) as usize;
+        let chosen = choose(&strips, &residual, &[], &goal, [180, 240]);
+        let expected: Vec<bool> = (0..strips.count).map(|s| s == ring).collect();
+        assert_eq!(chosen, expected);
+        // Never more quads than the last pass may have.
+        let others = choose(&strips, &residual, &[], &goal, [180, 190]);
+        assert!(!others[ring] && others.contains(&true));
+    }
 }
