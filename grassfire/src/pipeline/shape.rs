@@ -262,8 +262,7 @@ impl Workshop<'_> {
                     if least.is_none_or(|(least, _)| score.worse() < least.worse()) {
                         best = Ok((score, shape));
                     }
-                    // What coarser quads cannot finer ones may.
-                    if hopeless && size <= 1.0 {
+                    if hopeless {
                         break;
                     }
                 }
