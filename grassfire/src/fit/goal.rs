@@ -7,9 +7,6 @@ use crate::Vec3;
 /// Weight of the volume: as much as this share of the volume off counts like a goal missed by its own size.
 const VOLUME: f64 = 0.005;
 
-/// A surface is rough when it misses its goal on the whole by more than this factor.
-const ROUGH: f64 = 1.4;
-
 /// Distances aimed at, voxels.
 #[derive(Clone, Copy)]
 pub(super) struct Goal {
@@ -68,12 +65,6 @@ impl Goal {
     pub fn close(&self, figures: &Figures) -> bool {
         let close = |d: &Distances| d.rms <= self.rms && d.p95 <= self.p95;
         figures.both.iter().all(close)
-    }
-
-    /// Farther off on the whole than [`ROUGH`] times the goal.
-    pub fn rough(&self, figures: &Figures) -> bool {
-        let rough = |d: &Distances| d.rms > ROUGH * self.rms || d.p95 > ROUGH * self.p95;
-        figures.both.iter().any(rough)
     }
 
     /// Distance and volume in one number, the lower the better. Single places count by how far they are beyond the goal.

@@ -67,7 +67,7 @@ pub struct FitOptions {
     pub fold_limit: f64,
     /// Times that strips of quads are split where the mesh is too coarse for the proposal, at most; 0 keeps the quads.
     pub refinements: u32,
-    /// Refined meshes have at most this many times the quads; rough ones are refined on to 2000 quads.
+    /// Refined meshes have at most this many times the quads.
     pub most_quads: f64,
     /// Refinement ends when the rms distance is below this, 95 % below twice and everything below eight times this,
     /// voxels.

@@ -21,9 +21,6 @@ const TRIES: u32 = 6;
 const FAIRNESS: f64 = 0.25;
 /// A strip with more than this share of the residual may have the quads of later passes, too.
 const MAJOR: f64 = 1.0 / 3.0;
-/// Passes more for bodies that are still rough, as long as they have few quads.
-const MORE_PASSES: u32 = 2;
-const FEW_QUADS: f64 = 2000.0;
 
 /// A body with its system and the control points so far.
 pub(super) struct State<'a> {
@@ -45,7 +42,6 @@ pub(super) struct State<'a> {
 ///    make it cut itself or fold there are left alone.
 /// 4. Some rounds with little fairness at the volume of f > 0, each step shortened where it would make the body worse.
 /// 5. The pass is kept when the distance falls and the body is still sound; else it was the last one.
-/// 6. Bodies of few quads that are still rough get up to two passes more.
 pub(super) fn refine<'a>(
     mut state: State<'a>,
     skeleton: &Skeleton,
@@ -60,26 +56,15 @@ pub(super) fn refine<'a>(
         let growth = f64::from(passes) / f64::from(options.refinements);
         first * options.most_quads.powf(growth)
     };
-    let passes = match options.refinements {
-        0 => 0,
-        some => some + MORE_PASSES,
-    };
-    for pass in 0..passes {
-        let part = f64::from(pass) / f64::from(passes);
+    for pass in 0..options.refinements {
+        let part = f64::from(pass) / f64::from(options.refinements);
         monitor.step(STAGE, "refining", 0.75 + 0.15 * part)?;
-        let more = pass >= options.refinements;
-        if goal.met(&before) || more && !goal.rough(&before) {
+        if goal.met(&before) {
             break;
         }
         // Where the surface is close on the whole, only single places count.
         let beyond = if goal.close(&before) { goal.max } else { 0.0 };
-        let (most, last) = if more {
-            let most = most_of(pass + 1).min(FEW_QUADS);
-            (most, most)
-        } else {
-            (most_of(pass + 1), first * options.most_quads)
-        };
-        let most = [most, last].map(|quads| quads as usize);
+        let most = [pass + 1, options.refinements].map(|passes| most_of(passes) as usize);
         let Some(mut finer) = finer(&state, skeleton, &goal, beyond, most)? else {
             break;
         };

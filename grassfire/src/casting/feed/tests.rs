@@ -1,9 +1,6 @@
 use super::constraints::least_solution;
 use super::rules::Rules;
 use super::*;
-use crate::medial::{MedialOptions, medial_axis};
-use crate::mesh::TriMesh;
-use crate::remesh::{RemeshOptions, remesh};
 
 /// Numbers in [0, 1), the same in every run.
 struct Dice(u64);
@@ -351,65 +348,4 @@ fn the_growth_factors_agree() {
     // No arcs: the bounds are the solution.
     let least = least_solution(&[1.0, 2.0], &[], &[0.0; 2]).expect("no arcs");
     assert_eq!(least.values, [1.0, 2.0]);
-}
-
-/// A prism 10 mm high over the squares of 2 mm that are marked: walls of 4 mm with sharp edges.
-fn prism(rows: &[&str]) -> TriMesh {
-    const SIDE: f64 = 2.0;
-    let full = |i: i32, j: i32| {
-        let row = usize::try_from(j).ok().and_then(|j| rows.get(j));
-        let square = row.and_then(|row| row.as_bytes().get(usize::try_from(i).ok()?));
-        square == Some(&b'#')
-    };
-    let mut mesh = TriMesh::default();
-    let mut quad = |corners: [[i32; 3]; 4]| {
-        let corner =
-            |c: [i32; 3]| Vec3::from(c.map(f64::from)).component_mul(&Vec3::new(SIDE, SIDE, 10.0));
-        mesh.append(corners.map(corner).to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
-    };
-    for j in 0..rows.len() as i32 {
-        for i in (0..rows[0].len() as i32).filter(|&i| full(i, j)) {
-            let at = |k: usize, z: i32| {
-                let [x, y] = [[0, 0], [1, 0], [1, 1], [0, 1]][k % 4];
-                [i + x, j + y, z]
-            };
-            quad([at(0, 1), at(1, 1), at(2, 1), at(3, 1)]);
-            quad([at(3, 0), at(2, 0), at(1, 0), at(0, 0)]);
-            let beside = [(i, j - 1), (i + 1, j), (i, j + 1), (i - 1, j)];
-            for (k, _) in beside.iter().enumerate().filter(|(_, n)| !full(n.0, n.1)) {
-                quad([at(k, 0), at(k + 1, 0), at(k + 1, 1), at(k, 1)]);
-            }
-        }
-    }
-    mesh
-}
-
-/// Voxels of 0.5 mm had rounded the inner edges: T 1.22, X 1.30.
-#[test]
-fn balls_in_junctions_are_those_of_the_foundry() {
-    let (wide, stem) = ("############", ".....##.....");
-    let (arm, leg) = ("########", "##......");
-    let t = [wide, wide, stem, stem, stem, stem];
-    let x = [stem, stem, stem, wide, wide, stem, stem, stem];
-    let l = [arm, arm, leg, leg, leg, leg, leg, leg];
-    let root = 2.0_f64.sqrt();
-    let cases: [(&[&str], f64); 3] = [(&t, 1.25), (&x, root), (&l, 2.0 * root / (1.0 + root))];
-    let exact_field = RemeshOptions {
-        voxel: Some(0.25),
-        smoothing: 0.0,
-        min_tunnel: 0.0,
-        ..RemeshOptions::default()
-    };
-    let monitor = Monitor::default();
-    for (rows, ratio) in cases {
-        let solid = remesh(&prism(rows), &exact_field, &monitor).expect("a solid");
-        let axis = medial_axis(&solid.field, &MedialOptions::default(), &monitor);
-        let axis = axis.expect("an axis").mesh;
-        let largest = axis.radii.iter().copied().fold(0.0, f64::max);
-        let found = largest / 2.0;
-        assert!(
-            (found / ratio - 1.0).abs() < 0.02,
-            "{found:.3}, not {ratio:.3}"
-        );
-    }
 }
