@@ -262,7 +262,8 @@ impl Workshop<'_> {
                     if least.is_none_or(|(least, _)| score.worse() < least.worse()) {
                         best = Ok((score, shape));
                     }
-                    if hopeless {
+                    // What coarser quads cannot finer ones may.
+                    if hopeless && size <= 1.0 {
                         break;
                     }
                 }
