@@ -37,6 +37,12 @@ impl TriMesh {
         self.triangles[t].map(|v| self.points[v as usize])
     }
 
+    /// Unit normal of triangle `t`, out of the material; none where it has no area.
+    pub fn normal(&self, t: usize) -> Option<Vec3> {
+        let [a, b, c] = self.corners(t);
+        (b - a).cross(&(c - a)).try_normalize(0.0)
+    }
+
     /// Adds points, and triangles that count from the first of these. Tags are left to the caller.
     pub fn append(
         &mut self,

@@ -38,13 +38,7 @@ const SETTLED: f64 = 1e-6;
 impl<'a> TangentBalls<'a> {
     /// Prepares a surface.
     pub fn new(mesh: &'a TriMesh) -> Self {
-        let normal = |t: usize| {
-            let [a, b, c] = mesh.corners(t);
-            (b - a)
-                .cross(&(c - a))
-                .try_normalize(0.0)
-                .unwrap_or_default()
-        };
+        let normal = |t: usize| mesh.normal(t).unwrap_or_default();
         Self {
             mesh,
             bvh: Bvh::new(mesh),

@@ -38,13 +38,7 @@ fn intersect(mesh: &TriMesh, s: usize, t: usize) -> bool {
     match shared {
         0 | 1 => crosses(mesh, a, b) || crosses(mesh, b, a),
         2 => {
-            let normal = |t: usize| {
-                let [a, b, c] = mesh.corners(t);
-                (b - a)
-                    .cross(&(c - a))
-                    .try_normalize(0.0)
-                    .unwrap_or_default()
-            };
+            let normal = |t: usize| mesh.normal(t).unwrap_or_default();
             normal(s).dot(&normal(t)) < -0.9999
         }
         _ => true,

@@ -50,17 +50,17 @@ enum Found {
 pub fn inner_edges(
     balls: &TangentBalls,
     inscribed: &[Inscribed],
+    walls: &Walls,
     share: f64,
     width: f64,
 ) -> InnerEdges {
     let thickest = inscribed.iter().map(|i| i.ball.radius).fold(0.0, f64::max);
-    let walls = Walls::new(balls, inscribed);
     let found: Vec<Found> = inscribed
         .par_iter()
         .filter_map(|sample| {
             let most = (2.0 * share * (sample.ball.radius + thickest)).max(width / 2.0);
             let ball = balls.at(&sample.place, sample.triangle, false, most)?;
-            look(balls, &walls, sample, &ball, share, width)
+            look(balls, walls, sample, &ball, share, width)
         })
         .collect();
     let (mut fillets, mut gaps) = (Vec::new(), Vec::new());

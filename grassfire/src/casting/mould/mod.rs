@@ -303,7 +303,8 @@ pub fn mould(
     };
     let balls = TangentBalls::new(mesh);
     let inscribed = inscribed(mesh, &balls, options.wall_samples);
-    let steps = transitions(&balls, &inscribed);
+    let sides = Walls::new(&balls, &inscribed);
+    let steps = transitions(&sides);
     let steep = steps.get((options.exempt * steps.len() as f64) as usize);
     let mut out = Mould {
         draw,
@@ -320,6 +321,7 @@ pub fn mould(
         inner_edges: inner_edges(
             &balls,
             &inscribed,
+            &sides,
             rules.rounding().value,
             rules.hole().value,
         ),

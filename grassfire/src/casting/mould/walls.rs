@@ -27,10 +27,7 @@ pub fn walls(mesh: &TriMesh, samples: usize) -> Vec<Wall> {
         return Vec::new();
     };
     let size = (hi - lo).norm();
-    let normal = |t: u32| {
-        let [a, b, c] = mesh.corners(t as usize);
-        (b - a).cross(&(c - a)).try_normalize(0.0)
-    };
+    let normal = |t: u32| mesh.normal(t as usize);
     let measured = sample_surface(mesh, samples)
         .into_par_iter()
         .filter_map(|(p, t)| {
@@ -127,8 +124,8 @@ impl<'a> Walls<'a> {
 ///
 /// Compared are places with two parallel sides, half a thickness to two thicknesses apart in the same wall: between them lies the step. Where a wall ends in
 /// another one, or three meet, no sides are parallel.
-pub fn transitions(balls: &TangentBalls, inscribed: &[Inscribed]) -> Vec<(Vec3, f64)> {
-    let mut walls = Walls::new(balls, inscribed).0;
+pub fn transitions(walls: &Walls) -> Vec<(Vec3, f64)> {
+    let mut walls = walls.0.clone();
     // Along x, so that those within reach are neighbours in the list.
     walls.sort_by(|a, b| a.0.ball.centre.x.total_cmp(&b.0.ball.centre.x));
     let steepest = |i: usize| {
