@@ -389,7 +389,8 @@ fn rebuild(
     record.report.volume = Some(measure::volume_block(remeshed, &part));
 
     feeding::prove(record, &original, &part.mesh, options, monitor)?;
-    casting::mould_of(record, &part.mesh, &options.mould, monitor)?;
+    let on = (&bodies, remeshed.field.spacing);
+    casting::mould_of(record, &part.mesh, on, &options.mould, monitor)?;
     let mut pictures = record.stage("pictures", || {
         let stages = illustrate::Stages {
             remeshed,

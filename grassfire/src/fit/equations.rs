@@ -99,6 +99,31 @@ impl Equations {
         }
     }
 
+    /// Adds `weight (sum of w_p . x_p - value)^2` for the points p of `row`, ascending.
+    pub fn add_row(&mut self, row: &[(u32, Vec3)], weight: f64, value: f64) {
+        for (i, (c, wc)) in row.iter().enumerate() {
+            let first = self.offsets[*c as usize];
+            let column = &self.rows[first..self.offsets[*c as usize + 1]];
+            let height = 3 * column.len();
+            let mut at = 0;
+            for (r, wr) in &row[i..] {
+                at += column[at..]
+                    .iter()
+                    .position(|x| x == r)
+                    .expect("the pattern was made from these rows");
+                for j in 0..3 {
+                    let start = 9 * first + j * height + 3 * at;
+                    for k in 0..3 {
+                        self.values[start + k] += weight * wr[k] * wc[j];
+                    }
+                }
+            }
+            for k in 0..3 {
+                self.right[3 * *c as usize + k] += weight * value * wc[k];
+            }
+        }
+    }
+
     /// Adds `weight |x_p - place|^2` for one point.
     pub fn pin(&mut self, p: u32, weight: f64, place: &Vec3) {
         self.add(

@@ -6,6 +6,7 @@ mod data;
 mod equations;
 mod goal;
 mod guard;
+mod lean;
 mod raise;
 mod refine;
 mod residual;
@@ -19,6 +20,7 @@ mod untangle;
 mod volume;
 
 pub use clearance::clear_of;
+pub use lean::leaned;
 pub use raise::raised;
 pub use volume::volume;
 

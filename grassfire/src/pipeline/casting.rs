@@ -10,7 +10,9 @@ use super::{Outcome, ReconstructOptions, inputs};
 use crate::Vec3;
 #[cfg(feature = "occt")]
 use crate::cad;
-use crate::casting::mould::{self, Mould, MouldOptions, Repair, dexels, mould, parting};
+use crate::casting::mould::{
+    self, Mould, MouldOptions, Repair, RepairOptions, dexels, mould, parting,
+};
 use crate::casting::solidify::{Cell, HotSpot, Solidification, solidify};
 use crate::io::{self, Input};
 use crate::mesh::{TriMesh, repair};
@@ -204,19 +206,58 @@ fn repaired(
     Ok((repaired, solid))
 }
 
-/// Looks at the mould of a finished part when a draw direction is given; what was repaired before stays in the report.
+/// Lines of a finished part with more than one interval, and its undercut, mm3, both without what cores make; none where a core
+/// has no undercut any more.
+///
+/// # Errors
+/// Cancelled.
+pub(super) fn left(
+    part: &TriMesh,
+    draw: &Vec3,
+    repaired_as: &RepairOptions,
+    monitor: &Monitor,
+) -> Result<(Option<usize>, Option<f64>), StageError> {
+    let asked = RepairOptions {
+        kind: Repair::Fill,
+        draft: 0.0,
+        min_gap: 0.0,
+        removals: Vec::new(),
+        ..repaired_as.clone()
+    };
+    match mould::repair(part, draw, &asked, monitor) {
+        Ok(filled) => Ok((
+            Some(filled.multiple[0]),
+            Some(filled.volume[1] - filled.volume[0]),
+        )),
+        Err(mould::MouldError::Cancelled(cancelled)) => Err(cancelled.into()),
+        Err(_) => Ok((None, None)),
+    }
+}
+
+/// Looks at the mould of a finished part when a draw direction is given; what was repaired before on voxels of `cell` mm stays in
+/// the report, beside what is left of it.
 pub(super) fn mould_of(
     record: &mut Record,
     part: &TriMesh,
+    (bodies, cell): (&Bodies, f64),
     options: &MouldOptions,
     monitor: &Monitor,
 ) -> Result<(), PipelineError> {
-    if options.draw.is_none() {
+    let Some(draw) = options.draw else {
         return Ok(());
+    };
+    let mut finished = None;
+    if options.repairs() {
+        let mut asked = options.repair_options(0.0, cell);
+        asked.bores.clone_from(&bodies.bosses.free);
+        let draw = Vec3::from(draw).normalize();
+        finished = record
+            .stage("mould", || left(part, &draw, &asked, monitor))?
+            .0;
     }
     let options = MouldOptions {
         repair: Repair::Off,
-        repair_draft: 0.0,
+        repair_draft: None,
         min_gap: 0.0,
         removals: Vec::new(),
         ..options.clone()
@@ -231,6 +272,7 @@ pub(super) fn mould_of(
         repaired_volume: before.repaired_volume,
         multiple_lines_before: before.multiple_lines_before,
         multiple_lines: before.multiple_lines,
+        multiple_lines_finished: finished,
         ..block
     });
     Ok(())
@@ -298,6 +340,7 @@ fn mould_block(found: &Mould) -> MouldBlock {
         repaired_volume: repaired.map(|r| r.volume[1]),
         multiple_lines_before: repaired.map(|r| r.multiple[0]),
         multiple_lines: repaired.map(|r| r.multiple[1]),
+        multiple_lines_finished: None,
     }
 }
 

@@ -292,6 +292,7 @@ impl<'a> Site<'a> {
             lost: 0.0,
         };
         let (axis, mut shape) = self.shape(&base)?;
+        self.lean(&mut shape)?;
         let surface = self.surface(&shape)?;
         let intersections = shape.fitted.self_intersections.len();
         if shape.wrapped || intersections > 0 {

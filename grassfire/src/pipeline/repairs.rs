@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::casting::left;
 use super::edits::skeleton_of;
 use super::error::{PipelineError, StageError};
 use super::record::Record;
@@ -10,7 +11,7 @@ use crate::Vec3;
 use crate::case::Case;
 use crate::casting::mould::{
     self, Conflict, Repair, RepairOptions, Room, best_direction, choose, conflicts, dexels,
-    parting, repair, rooms,
+    parting, rooms,
 };
 use crate::edit::Edit;
 use crate::mesh::TriMesh;
@@ -274,20 +275,11 @@ impl<'a> Search<'a> {
     ) -> Result<(Option<usize>, Option<f64>), PipelineError> {
         let cores = self.picked(ways).filter(|w| *w.1 == Way::Core);
         let mut asked = self.base.clone();
-        asked.draft = 0.0;
-        asked.removals.clear();
         asked.cores.extend(cores.map(|(room, _)| room.place));
-        match repair(mesh, &self.draw, &asked, monitor) {
-            Ok(filled) => Ok((
-                Some(filled.multiple[0]),
-                Some(filled.volume[1] - filled.volume[0]),
-            )),
-            Err(mould::MouldError::Cancelled(cancelled)) => Err(PipelineError {
-                stage: STAGE,
-                source: cancelled.into(),
-            }),
-            Err(_) => Ok((None, None)),
-        }
+        left(mesh, &self.draw, &asked, monitor).map_err(|source| PipelineError {
+            stage: STAGE,
+            source,
+        })
     }
 
     fn block(self) -> RepairsBlock {

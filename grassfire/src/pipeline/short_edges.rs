@@ -4,6 +4,8 @@ use super::construct::Site;
 use super::error::{PipelineError, StageError};
 use super::shape::{self, Shape, Surface};
 use super::union::{self, Joined};
+use crate::Vec3;
+use crate::fit::leaned;
 use crate::spline::{Crowded, sink_flush, slide_borders};
 
 /// Times that borders are slid.
@@ -25,7 +27,7 @@ fn length(short: Option<&[Crowded]>) -> f64 {
 
 impl Site<'_> {
     /// [`Site::joined`] for the body sunk below walls that it is nearly flush with; where that leaves very short edges also for
-    /// the body as it is, and the one whose shortest edge is longer is kept.
+    /// the body as it is, and the one whose shortest edge is longer is kept. Where the proposal got draft, the walls of both lean.
     pub(super) fn joined_below(
         &mut self,
         shape: &mut Shape,
@@ -37,15 +39,18 @@ impl Site<'_> {
             sink_flush(&shape.fitted.mesh, walls, lengths, &options.patches)
         })?;
         let Some(mesh) = sunk else {
+            self.lean(shape)?;
             let surface = self.surface(shape)?;
             let (surface, joined, _) = self.joined(shape, surface)?;
             return Ok((surface, joined));
         };
         let mut deeper = shape.clone();
         deeper.fitted.mesh = mesh;
+        self.lean(&mut deeper)?;
         let surface = self.surface(&deeper)?;
         let (surface, joined, shortest) = self.joined(&mut deeper, surface)?;
         if shortest < MUCH_SHORTER * options.cad.least_edge * self.remeshed.field.spacing {
+            self.lean(shape)?;
             let plain = self.surface(shape)?;
             let plain = self.joined(shape, plain)?;
             if plain.2 > shortest {
@@ -55,6 +60,23 @@ impl Site<'_> {
         }
         *shape = deeper;
         Ok((surface, joined))
+    }
+
+    /// Makes upright walls lean as those of the proposal do, where it was repaired for a mould.
+    pub(super) fn lean(&mut self, shape: &mut Shape) -> Result<(), PipelineError> {
+        let (options, field) = (self.options, &self.remeshed.field);
+        let Some(draw) = options.mould.leans() else {
+            return Ok(());
+        };
+        let along = (field, &Vec3::from(draw).normalize());
+        let fitted = &shape.fitted;
+        let turned = self.record.stage("fit", || {
+            leaned(&fitted.mesh, fitted, along, &options.fit, self.monitor)
+        })?;
+        if let Some(mesh) = turned {
+            shape.fitted.mesh = mesh;
+        }
+        Ok(())
     }
 
     /// Puts the non-design bodies to the body. While the union has edges shorter than `cad.least_edge`, where meshes of the

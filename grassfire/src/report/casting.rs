@@ -150,6 +150,9 @@ pub struct MouldBlock {
     /// And after it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub multiple_lines: Option<usize>,
+    /// In the finished part, without what cores make.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub multiple_lines_finished: Option<usize>,
 }
 
 /// An inner edge between the fitted body and a non-design body that was to get a fillet.
@@ -371,6 +374,7 @@ fn mould(block: &MouldBlock) -> Markup {
             }
             @if let Some(volume) = block.repaired_volume { div { dt { "Volume when repaired" } dd { (with_unit(volume, 5, "mm³")) } } }
             @if let (Some(before), Some(after)) = (block.multiple_lines_before, block.multiple_lines) { div { dt { "Lines with hidden gaps, before and after the repair" } dd { (count(before)) ", " (count(after)) } } }
+            @if let Some(left) = block.multiple_lines_finished { div { dt { "Such lines in the finished part, without those of cores" } dd { (count(left)) } } }
         }
         @if !block.findings.is_empty() {
             div .scroll { table {

@@ -13,6 +13,7 @@ pub mod repair;
 mod rooms;
 pub mod rules;
 mod sheet;
+mod taper;
 #[cfg(test)]
 mod tests;
 pub mod undercuts;
@@ -63,8 +64,8 @@ pub struct MouldOptions {
     pub repair: Repair,
     /// For the repair `keep`: what filling a volume costs against removing one.
     pub fill_cost: f64,
-    /// Draft that the repair adds, degrees.
-    pub repair_draft: f64,
+    /// Draft that the repair adds, degrees; without it the least that the rules allow, where undercuts are repaired.
+    pub repair_draft: Option<f64>,
     /// A place in each undercut that a core makes, mm: a repair leaves it open.
     pub cores: Vec<[f64; 3]>,
     /// A place in each undercut whose lesser side, below or above it along the draw direction, is taken away, mm.
@@ -95,7 +96,7 @@ impl Default for MouldOptions {
             exempt: 0.01,
             repair: Repair::Off,
             fill_cost: 0.5,
-            repair_draft: 0.0,
+            repair_draft: None,
             cores: Vec::new(),
             removals: Vec::new(),
             core_price: None,
@@ -111,9 +112,23 @@ impl MouldOptions {
     /// A repair is asked for.
     pub fn repairs(&self) -> bool {
         self.repair != Repair::Off
-            || self.repair_draft > 0.0
+            || self.added_draft() > 0.0
             || self.min_gap > 0.0
             || !self.removals.is_empty()
+    }
+
+    /// Draft that a repair adds, degrees.
+    pub fn added_draft(&self) -> f64 {
+        let usual = match self.repair {
+            Repair::Off => 0.0,
+            _ => self.rules.draft().value,
+        };
+        self.repair_draft.unwrap_or(usual)
+    }
+
+    /// The draw direction, where the part is repaired along it and gets draft.
+    pub fn leans(&self) -> Option<[f64; 3]> {
+        self.draw.filter(|_| self.added_draft() > 0.0)
     }
 
     /// The repair that is asked for, with the parting plane at a height along the draw direction and voxels of `cell`, mm.
@@ -121,7 +136,7 @@ impl MouldOptions {
         RepairOptions {
             kind: self.repair,
             fill_cost: self.fill_cost,
-            draft: self.repair_draft,
+            draft: self.added_draft(),
             parting,
             cell,
             cores: self.cores.iter().map(|p| Vec3::from(*p)).collect(),
@@ -382,7 +397,7 @@ pub fn check(options: &MouldOptions) -> Result<(), MouldError> {
     range("core_price", price, 0.0, 1e12, "0 or more, mm3")?;
     range("tries", options.tries as f64, 1.0, 1000.0, "1 to 1000")?;
     range("min_gap", options.min_gap, 0.0, 1e6, "0 or more, mm")?;
-    range("repair_draft", options.repair_draft, 0.0, 30.0, "0 to 30")?;
+    range("repair_draft", options.added_draft(), 0.0, 30.0, "0 to 30")?;
     range(
         "cell",
         options.cell.unwrap_or(1.0),

@@ -7,6 +7,7 @@ use super::cores::cored;
 use super::dexels::axes;
 use super::gaps::{close_gaps, density};
 use super::rooms::remove_lesser;
+use super::taper::taper;
 use super::{MouldError, STAGE};
 use crate::Vec3;
 use crate::fe::components;
@@ -95,8 +96,8 @@ pub struct Repaired {
 ///    maximum subarray, exact); what lies outside goes, what lies inside is filled as above. Loose
 ///    pieces go as before.
 /// 5. With `min_gap` narrower gaps go solid, but not what cores make; what that hides is filled.
-/// 6. Draft: from both ends towards `parting`, every value becomes at least the one before plus the tangent of the draft
-///    times the step.
+/// 6. Draft: from both ends towards `parting`, or to what of a wall is nearest to it, every value becomes at least the one before
+///    plus the tangent of the draft times the step.
 /// 7. The surface is extracted and turned back.
 ///
 /// # Errors
@@ -136,11 +137,9 @@ pub fn repair(
         }
     }
     if options.draft > 0.0 {
-        add_draft(
-            &mut field,
-            options.draft.to_radians().tan(),
-            options.parting,
-        );
+        settle_empty(&mut field);
+        let tangent = options.draft.to_radians().tan();
+        taper(&mut field, tangent, options.parting);
     }
     let after = multiple(&field);
     for (v, value) in open {
@@ -252,7 +251,7 @@ fn turn(mesh: &TriMesh, f: impl Fn(&Vec3) -> Vec3) -> TriMesh {
 }
 
 /// Lines along z with more than one interval of material.
-fn multiple(field: &VoxelGrid<f32>) -> usize {
+pub(super) fn multiple(field: &VoxelGrid<f32>) -> usize {
     let [nx, ny, nz] = field.dims;
     let inside = |i: usize, j: usize, k: usize| field.values[field.index(i, j, k)] > 0.0;
     let mut count = 0;
@@ -266,7 +265,7 @@ fn multiple(field: &VoxelGrid<f32>) -> usize {
 }
 
 /// Calls `change` with the values of every line along z.
-fn for_each_line(field: &mut VoxelGrid<f32>, mut change: impl FnMut(&mut [f32])) {
+pub(super) fn for_each_line(field: &mut VoxelGrid<f32>, mut change: impl FnMut(&mut [f32])) {
     let [nx, ny, nz] = field.dims;
     let mut line = vec![0.0; nz];
     for j in 0..ny {
@@ -316,6 +315,23 @@ fn keep(field: &mut VoxelGrid<f32>, cost: f64) {
     });
 }
 
+/// Empty voxels without material beside them are far from it: what removals left behind is no surface that draft may grow from.
+fn settle_empty(field: &mut VoxelGrid<f32>) {
+    let [nx, ny, nz] = field.dims;
+    let far = -3.0 * field.spacing as f32;
+    let solid: Vec<bool> = field.values.iter().map(|f| *f > 0.0).collect();
+    for v in (0..solid.len()).filter(|&v| !solid[v]) {
+        let [i, j, k] = field.ijk(v);
+        let low = [(i, 1), (j, nx), (k, nx * ny)];
+        let high = [(i + 1 < nx, 1), (j + 1 < ny, nx), (k + 1 < nz, nx * ny)];
+        let below = low.iter().any(|&(at, step)| at > 0 && solid[v - step]);
+        let above = high.iter().any(|&(inside, step)| inside && solid[v + step]);
+        if field.values[v] >= -0.5 * field.spacing as f32 && !below && !above {
+            field.values[v] = far;
+        }
+    }
+}
+
 /// Empties all pieces but the largest; gives how many there were and their volume, mm3, none when there is one.
 fn drop_loose(field: &mut VoxelGrid<f32>) -> Option<(usize, f64)> {
     let solid: Vec<bool> = field.values.iter().map(|f| *f > 0.0).collect();
@@ -349,31 +365,6 @@ fn best_interval(worth: impl Iterator<Item = f64>) -> Option<[usize; 2]> {
         }
     }
     best.map(|b| b.1)
-}
-
-/// Widens every line towards the height `parting` by `tangent` a length.
-fn add_draft(field: &mut VoxelGrid<f32>, tangent: f64, parting: f64) {
-    let step = (tangent * field.spacing) as f32;
-    // Beyond the exact band values say only "far": growth from there would make material of nothing.
-    let far = -2.5 * field.spacing as f32;
-    let middle = ((parting - field.origin.z) / field.spacing)
-        .round()
-        .max(0.0) as usize;
-    for_each_line(field, |line| {
-        let middle = middle.min(line.len() - 1);
-        for k in 1..=middle {
-            let grown = line[k - 1] + step;
-            if line[k - 1] > far {
-                line[k] = line[k].max(grown);
-            }
-        }
-        for k in (middle..line.len() - 1).rev() {
-            let grown = line[k + 1] + step;
-            if line[k + 1] > far {
-                line[k] = line[k].max(grown);
-            }
-        }
-    });
 }
 
 #[cfg(test)]

@@ -1,0 +1,292 @@
+//! Upright walls of a body that leaves a mould lean inwards away from the parting: no wave of a fit overhangs.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Matrix3;
+use rayon::prelude::*;
+
+use super::guard::guarded_step;
+use super::round::Solver;
+use super::surface::Surface;
+use super::tangles::Tangles;
+use super::targets::{IsoSamples, flow_to_surface};
+use super::{FitError, FitOptions, Fitted, STAGE};
+use crate::Vec3;
+use crate::monitor::Monitor;
+use crate::spline::ControlMesh;
+use crate::voxel::VoxelGrid;
+
+/// Rounds, at most.
+const ROUNDS: u32 = 12;
+/// Rounds that bring nothing before it ends.
+const PATIENCE: u32 = 3;
+/// Lean asked for: the sine of half a degree.
+const LEAN: f64 = 0.0087;
+/// What is steeper than this in the proposal cannot overhang by waves.
+const UPRIGHT: f64 = 0.35;
+/// The proposal itself overhangs by more: a core's or a non-design body's work.
+const OVERHANG: f64 = -0.05;
+/// Normals of body and proposal with less than this cosine belong to two walls.
+const AGREE: f64 = 0.5;
+/// Half of the way along the draw direction over which the proposal tells where its mould parts, voxels.
+const REACH: f64 = 3.0;
+/// A wall that leans wrongly by an angle weighs as much as control points that move by this many voxels times the angle, at first.
+const WEIGHT: f64 = 20.0;
+/// Growth of that in every round.
+const GROWTH: f64 = 1.5;
+/// Weight of bending what is added, against moving it.
+const FAIRNESS: f64 = 1.0;
+/// A control point moves by at most this, voxels.
+const MOST: f64 = 1.0;
+
+/// A piece of an upright wall.
+struct Piece {
+    /// Quad of the samples.
+    quad: usize,
+    /// 1 where the wall must look along the draw direction, -1 where against it.
+    side: f64,
+    /// Component of its normal along that.
+    lean: f64,
+    area: f64,
+}
+
+/// The control mesh `mesh`, of the quads of `fitted`, with upright walls that do not overhang along `draw`; none where none does.
+///
+/// 1. Pieces of upright walls (16 a quad) know from the proposal on which side of the parting they lie: along the draw direction its
+///    field falls away from the parting. Pieces that overhang in the proposal, too, are left alone.
+/// 2. Rounds turn the pieces that lean inwards by less than half a degree (linearised, with a weight that grows), by the least
+///    move of control points, bent as little as possible. Steps are shortened where they would create an intersection or a fold.
+/// 3. The round with the least overhang is kept.
+///
+/// `field` is the signed distance to the proposal, mm, positive inside.
+///
+/// # Errors
+/// A mesh that cannot be subdivided, a system that cannot be factorised; cancelled.
+pub fn leaned(
+    mesh: &ControlMesh,
+    fitted: &Fitted,
+    (field, draw): (&VoxelGrid<f32>, &Vec3),
+    options: &FitOptions,
+    monitor: &Monitor,
+) -> Result<Option<ControlMesh>, FitError> {
+    let (surface, iso) = (Surface::new(&fitted.body, field)?, IsoSamples::default());
+    let mut solver = Solver::new(surface, field, &iso, options)?;
+    let start: Vec<Vec3> = mesh.points.iter().map(|p| field.to_grid(p)).collect();
+    let mut least = solver.overhang(&start, draw);
+    let mut found = Tangles::of(&solver, &start);
+    let (mut here, mut best) = (start.clone(), None);
+    let (mut weight, mut idle) = (WEIGHT, 0);
+    for round in 0..ROUNDS {
+        if least <= 0.0 || idle == PATIENCE {
+            break;
+        }
+        let part = f64::from(round) / f64::from(ROUNDS);
+        monitor.step(STAGE, "upright walls", part)?;
+        let wanted = solver
+            .turned(&start, &here, draw, weight)
+            .map_err(|reason| FitError::Solver { round, reason })?;
+        let Some(step) = guarded_step(&mut solver, &here, &wanted, &found) else {
+            break;
+        };
+        (here, found) = step;
+        let now = solver.overhang(&here, draw);
+        idle += 1;
+        if now < least {
+            (least, idle) = (now, 0);
+            best = Some(here.clone());
+        }
+        weight *= GROWTH;
+    }
+    Ok(best.map(|points| solver.surface.control_mesh(&points)))
+}
+
+impl Solver<'_> {
+    /// Volume-like measure of what overhangs: area times lean, squared voxels.
+    fn overhang(&self, points: &[Vec3], draw: &Vec3) -> f64 {
+        let at = self.surface.samples.apply(points);
+        let pieces = self.upright(&at, draw);
+        pieces.iter().map(|p| p.area * (-p.lean).max(0.0)).sum()
+    }
+
+    /// The pieces of upright walls.
+    fn upright(&self, at: &[Vec3], draw: &Vec3) -> Vec<Piece> {
+        let quads = &self.surface.fine.quads;
+        let piece = |quad: usize| {
+            let [a, b, c, d] = quads[quad].map(|v| at[v as usize]);
+            let across = (c - a).cross(&(d - b)) / 2.0;
+            let area = across.norm();
+            let normal = across.try_normalize(1e-12)?;
+            let (place, outward) = flow_to_surface(self.field, &((a + b + c + d) / 4.0), 6);
+            let side = self.side(&place, draw)?;
+            let (steep, lean) = (side * outward.dot(draw), side * normal.dot(draw));
+            let wall = steep < UPRIGHT && steep > OVERHANG && outward.dot(&normal) > AGREE;
+            wall.then_some(Piece {
+                quad,
+                side,
+                lean,
+                area,
+            })
+        };
+        (0..quads.len())
+            .into_par_iter()
+            .with_min_len(512)
+            .filter_map(piece)
+            .collect()
+    }
+
+    /// On which side of the parting a place of the proposal's surface lies.
+    fn side(&self, place: &Vec3, draw: &Vec3) -> Option<f64> {
+        let value = |way: f64| {
+            let p = place + way * REACH * draw;
+            let at = self.field.origin + self.field.spacing * p;
+            self.field.sample(&at)
+        };
+        let falls = value(-1.0) - value(1.0);
+        (falls != 0.0).then(|| falls.signum())
+    }
+
+    /// Control points whose walls lean, those of `here` turned, as near to `start` as may be.
+    fn turned(
+        &mut self,
+        start: &[Vec3],
+        here: &[Vec3],
+        draw: &Vec3,
+        weight: f64,
+    ) -> Result<Vec<Vec3>, String> {
+        let at = self.surface.samples.apply(here);
+        let (_, areas) = self.surface.normals_and_areas(&at);
+        let mean_area = areas.iter().sum::<f64>() / here.len().max(1) as f64;
+        self.equations.clear();
+        for (p, place) in start.iter().enumerate() {
+            self.equations.pin(p as u32, mean_area, place);
+            let (indices, weights) = self.surface.bending.row(p);
+            let block = FAIRNESS * mean_area * Matrix3::identity();
+            let bent = self.surface.bending.apply_row(p, start);
+            self.equations
+                .add(indices, weights, &block, &(block * bent));
+        }
+        for piece in self.upright(&at, draw) {
+            if piece.lean < LEAN {
+                self.add_turn(&piece, here, &at, (draw, weight));
+            }
+        }
+        let mut points = self.equations.solve(&self.equations.factor()?)?;
+        for (p, from) in points.iter_mut().zip(start) {
+            let way = *p - from;
+            *p = from + way * (MOST / way.norm().max(1e-9)).min(1.0);
+        }
+        Ok(points)
+    }
+
+    /// The row that turns a piece of a wall.
+    fn add_turn(
+        &mut self,
+        piece: &Piece,
+        points: &[Vec3],
+        at: &[Vec3],
+        (draw, weight): (&Vec3, f64),
+    ) {
+        let corners = self.surface.fine.quads[piece.quad];
+        let [a, b, c, d] = corners.map(|v| at[v as usize]);
+        // How the component of the normal along the draw direction changes with the corners.
+        let scale = piece.side / (2.0 * piece.area);
+        let along_c = scale * (d - b).cross(draw);
+        let along_d = scale * draw.cross(&(c - a));
+        let change = [-along_c, -along_d, along_c, along_d];
+        let mut row: BTreeMap<u32, Vec3> = BTreeMap::new();
+        for (corner, change) in corners.iter().zip(change) {
+            let (controls, weights) = self.surface.samples.row(*corner as usize);
+            for (p, w) in controls.iter().zip(weights) {
+                *row.entry(*p).or_default() += *w * change;
+            }
+        }
+        let here: f64 = row.iter().map(|(p, w)| w.dot(&points[*p as usize])).sum();
+        let row: Vec<(u32, Vec3)> = row.into_iter().collect();
+        let wanted = here + LEAN - piece.lean;
+        self.equations
+            .add_row(&row, weight * weight * piece.area, wanted);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes::{CUBOID, cuboid_corners};
+    use crate::spline::catmull_clark::{QuadTopology, limit_mesh};
+    use crate::thicken::ThickenedBody;
+
+    /// A block of 18 x 18 x 18 mm whose walls wave along z, up to 4 degrees off.
+    fn wavy_block() -> ControlMesh {
+        let mut mesh = ControlMesh {
+            points: cuboid_corners(Vec3::repeat(-10.0), Vec3::repeat(10.0)),
+            quads: CUBOID.to_vec(),
+        };
+        for _ in 0..3 {
+            let topology = QuadTopology::new(mesh.points.len(), &mesh.quads).expect("closed");
+            let (operator, refined) = topology.split().expect("closed");
+            mesh.points = operator.apply(&mesh.points);
+            mesh.quads = refined.quads;
+        }
+        for p in &mut mesh.points {
+            // Splits round a block off: back onto its faces.
+            *p *= 9.0 / p.amax();
+            let out = 1.0 + 0.015 * (0.6 * p.z).sin();
+            (p.x, p.y) = (p.x * out, p.y * out);
+        }
+        mesh
+    }
+
+    /// Signed distance to a block of 17 x 17 x 18 mm with draft of 0.02 from its middle height, about.
+    fn drafted() -> VoxelGrid<f32> {
+        let mut field = VoxelGrid::filled(Vec3::repeat(-13.0), 0.5, [53, 53, 53], 0.0_f32);
+        for v in 0..field.values.len() {
+            let [i, j, k] = field.ijk(v);
+            let p = field.origin + 0.5 * Vec3::new(i as f64, j as f64, k as f64);
+            let wide = 8.5 - 0.02 * p.z.abs();
+            let inside = (wide - p.x.abs())
+                .min(wide - p.y.abs())
+                .min(9.0 - p.z.abs());
+            field.values[v] = inside as f32;
+        }
+        field
+    }
+
+    /// Area of upright walls that overhang by more than a twentieth of a degree, mm2.
+    fn overhanging(mesh: &ControlMesh) -> f64 {
+        let (fine, _) = limit_mesh(mesh, 3).expect("closed");
+        let all = (0..fine.triangles.len()).map(|t| {
+            let [a, b, c] = fine.corners(t);
+            let (normal, z) = ((b - a).cross(&(c - a)) / 2.0, (a.z + b.z + c.z) / 3.0);
+            let lean = z.signum() * normal.z / normal.norm();
+            // Near the parting the sides of one triangle are both right.
+            let wrong = lean < -1e-3 && z.abs() > 0.5 && z.abs() < 7.0;
+            f64::from(u8::from(wrong)) * normal.norm()
+        });
+        all.sum()
+    }
+
+    #[test]
+    fn waves_of_upright_walls_do_not_overhang_any_more() {
+        let (mesh, field) = (wavy_block(), drafted());
+        let fitted = Fitted {
+            body: ThickenedBody {
+                mesh: mesh.clone(),
+                ..ThickenedBody::default()
+            },
+            ..Fitted::default()
+        };
+        let (options, monitor) = (FitOptions::default(), Monitor::default());
+        let along = (&field, &Vec3::z());
+        let turned = leaned(&mesh, &fitted, along, &options, &monitor).expect("it can be solved");
+        let turned = turned.expect("walls overhang");
+        let (before, after) = (overhanging(&mesh), overhanging(&turned));
+        assert!(before > 100.0, "{before} mm2 before");
+        assert!(after < 0.01 * before, "{after} of {before} mm2");
+        let moves = mesh.points.iter().zip(&turned.points);
+        let most = moves.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(most < 0.5, "moved by {most} mm");
+        let again = leaned(&turned, &fitted, along, &options, &monitor).expect("it can be solved");
+        let left = again.map_or(after, |mesh| overhanging(&mesh));
+        assert!(left <= after, "{left} of {after} mm2");
+    }
+}
