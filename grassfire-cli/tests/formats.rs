@@ -145,6 +145,7 @@ fn unknown_formats_and_chords_are_refused_before_anything_is_written() {
         (vec!["--set", "files.formats=[\"dwg\"]"], "dwg"),
         (vec!["--set", "files.chord=0"], "files.chord"),
         (vec!["--crease-angle", "200"], "crease_angle"),
+        (vec!["--set", "cad.fillet=0"], "cad.fillet"),
     ];
     if !cfg!(feature = "occt") {
         bad.push((vec!["--format", "iges"], "no OpenCASCADE"));

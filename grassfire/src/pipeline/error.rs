@@ -118,6 +118,8 @@ pub enum StageError {
         super::exchange::MIN_CHORD
     )]
     Chord { chord: f64 },
+    #[error("cad.fillet is {radius} mm; more than 0 wanted, or rule, or off")]
+    FilletRadius { radius: f64 },
     #[error("flats.crease_angle is {angle} degrees; more than 0 and less than 180 wanted")]
     CreaseAngle { angle: f64 },
     #[error("the triangles of {name} do not close: {source}")]
@@ -189,6 +191,9 @@ impl PipelineError {
             StageError::Format { .. } => Some("build with the default feature occt".into()),
             StageError::Chord { .. } => {
                 Some("leave it out, or give a length such as files.chord=0.02".into())
+            }
+            StageError::FilletRadius { .. } => {
+                Some("leave it out, or give a length such as cad.fillet=2".into())
             }
             StageError::CreaseAngle { .. } => {
                 Some("leave it out, or give an angle such as flats.crease_angle=40".into())

@@ -9,9 +9,9 @@ use super::deliver::Delivery;
 use super::error::StageError;
 use super::union::Part;
 use super::{ReconstructJob, ReconstructOptions};
-use crate::cad::StepOptions;
 #[cfg(feature = "occt")]
 use crate::cad::{self, FeederBody};
+use crate::cad::{FilletRadius, StepOptions};
 use crate::io::{self, ThreeMfObject, ThreeMfTexts};
 use crate::mesh::{Solid, TriMesh};
 use crate::monitor::Monitor;
@@ -72,10 +72,10 @@ pub struct FileOptions {
 /// A smaller chord (mm) makes millions of triangles on parts of any size and nothing better.
 pub(super) const MIN_CHORD: f64 = 1e-3;
 
-/// Refuses what this build cannot write and chords that are no length, before anything is read.
+/// Refuses what this build cannot write, and chords and radii that are no length, before anything is read.
 ///
 /// # Errors
-/// [`StageError::Format`], [`StageError::NoFeeders`], [`StageError::Chord`].
+/// [`StageError::Format`], [`StageError::NoFeeders`], [`StageError::CreaseAngle`], [`StageError::FilletRadius`], [`StageError::Chord`].
 pub(super) fn check(options: &ReconstructOptions) -> Result<(), StageError> {
     let files = &options.files;
     if let Some(format) = files.formats.iter().find(|format| !format.available()) {
@@ -90,6 +90,11 @@ pub(super) fn check(options: &ReconstructOptions) -> Result<(), StageError> {
         && !(angle > 0.0 && angle < 180.0)
     {
         return Err(StageError::CreaseAngle { angle });
+    }
+    if let FilletRadius::Radius(radius) = options.cad.fillet
+        && !(radius.is_finite() && radius > 0.0)
+    {
+        return Err(StageError::FilletRadius { radius });
     }
     match files.chord {
         Some(chord) if !(chord.is_finite() && chord >= MIN_CHORD) => {

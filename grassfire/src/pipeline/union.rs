@@ -11,9 +11,7 @@ use crate::Vec3;
 #[cfg(feature = "occt")]
 use crate::cad::{self, CadSolid, Fillet, FilletRadius, FilletRule, NonDesignResult};
 #[cfg(feature = "occt")]
-use crate::casting::mould::{Walls, inscribed};
-#[cfg(feature = "occt")]
-use crate::mesh::TangentBalls;
+use crate::casting::mould::with_walls;
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
 #[cfg(feature = "occt")]
@@ -265,14 +263,11 @@ fn rounded(
         FilletRadius::Radius(radius) => round(&|_| radius, solid)?,
         FilletRadius::Word(FilletRule::Rule) => {
             let mesh = cad::tessellate(&solid, CHORD * voxel)?;
-            let balls = TangentBalls::new(&mesh);
-            let inscribed = inscribed(&mesh, &balls, options.mould.wall_samples);
-            let walls = Walls::new(&balls, &inscribed);
             let share = options.mould.rules.rounding().value;
-            round(
-                &|p| share * walls.meeting(&balls, p).unwrap_or(4.0 * voxel),
-                solid,
-            )?
+            with_walls(&mesh, options.mould.wall_samples, |balls, _, walls| {
+                let sum = |p: &Vec3| walls.meeting(balls, p).unwrap_or(4.0 * voxel);
+                round(&|p| share * sum(p), solid)
+            })?
         }
     };
     let block = |fillet: Fillet| FilletBlock {

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::apart::apart;
 use super::walls::{Inscribed, Walls};
 use crate::Vec3;
 use crate::mesh::{TangentBall, TangentBalls};
@@ -74,10 +75,12 @@ pub fn inner_edges(
     let ratio = |edge: &InnerEdge| edge.value / edge.wall;
     fillets.sort_by(|a, b| ratio(a).total_cmp(&ratio(b)));
     gaps.sort_by(|a, b| a.value.total_cmp(&b.value));
+    // Two walls from those before.
+    let near = |a: &InnerEdge, b: &InnerEdge| (a.place - b.place).norm() < 2.0 * (a.wall + b.wall);
     InnerEdges {
-        fillets: apart(fillets),
+        fillets: apart(fillets, LISTED, near),
         short,
-        gaps: apart(gaps),
+        gaps: apart(gaps, LISTED, near),
     }
 }
 
@@ -138,19 +141,4 @@ fn settle(balls: &TangentBalls, from: Vec3, ball: &TangentBall) -> (Vec3, f64) {
         now.radius
     };
     ((p + now.touch) / 2.0, radius)
-}
-
-/// The first of the list, each two walls from those before.
-fn apart(list: Vec<InnerEdge>) -> Vec<InnerEdge> {
-    let mut out: Vec<InnerEdge> = Vec::new();
-    for edge in list {
-        if out.len() == LISTED {
-            break;
-        }
-        let near = |o: &InnerEdge| (o.place - edge.place).norm() < 2.0 * (o.wall + edge.wall);
-        if !out.iter().any(near) {
-            out.push(edge);
-        }
-    }
-    out
 }

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::apart::apart;
 use super::walls::Inscribed;
 use crate::Vec3;
 use crate::mesh::{TangentBall, TangentBalls};
@@ -77,9 +78,9 @@ const WIDEST: usize = 34;
 ///
 /// In equal walls T without fillets have a ratio of 1.25, X of 1.41, L of 1.17; with fillets they have more.
 pub fn junctions(balls: &TangentBalls, inscribed: &[Inscribed]) -> Vec<Junction> {
-    let starts = apart(inscribed.iter().map(|i| i.ball).collect());
+    let starts = largest(inscribed.iter().map(|i| i.ball).collect());
     let ends: Vec<TangentBall> = starts.par_iter().map(|ball| uphill(balls, ball)).collect();
-    let found: Vec<Junction> = apart(ends)
+    let found: Vec<Junction> = largest(ends)
         .par_iter()
         .filter_map(|ball| junction(balls, ball.centre, ball.radius))
         .collect();
@@ -101,16 +102,11 @@ pub fn junctions(balls: &TangentBalls, inscribed: &[Inscribed]) -> Vec<Junction>
 }
 
 /// The largest ball, the largest outside it, and so on.
-fn apart(mut balls: Vec<TangentBall>) -> Vec<TangentBall> {
+fn largest(mut balls: Vec<TangentBall>) -> Vec<TangentBall> {
     balls.sort_by(|a, b| b.radius.total_cmp(&a.radius));
-    let mut kept: Vec<TangentBall> = Vec::new();
-    for one in balls {
-        let near = |k: &TangentBall| (k.centre - one.centre).norm() < APART * k.radius;
-        if !kept.iter().any(near) {
-            kept.push(one);
-        }
-    }
-    kept
+    let near =
+        |k: &TangentBall, one: &TangentBall| (k.centre - one.centre).norm() < APART * k.radius;
+    apart(balls, usize::MAX, near)
 }
 
 /// Directions from a centre to where its ball touches, the nearest first; those within `leans` times its distance.

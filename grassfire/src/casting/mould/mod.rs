@@ -1,5 +1,6 @@
 //! The mould: undercuts, parting, draft, walls, the best draw direction, and repair.
 
+mod apart;
 mod choose;
 mod conflicts;
 mod cores;
@@ -33,10 +34,10 @@ pub use repair::{Repair, RepairOptions, Repaired, repair};
 pub use rooms::{Room, rooms};
 pub use rules::{Alloy, Limit, Process, Rules};
 pub use undercuts::{Undercut, parting, undercuts};
-pub use walls::{Inscribed, Wall, Walls, inscribed, transitions, walls};
+pub use walls::{Inscribed, Wall, Walls, inscribed, transitions, walls, with_walls};
 
 use crate::Vec3;
-use crate::mesh::{TangentBalls, TriMesh};
+use crate::mesh::TriMesh;
 use crate::monitor::{Cancelled, Monitor};
 use crate::remesh::RemeshError;
 
@@ -316,10 +317,15 @@ pub fn mould(
         (Some(thick), Some(thin)) => thick.thickness / thin.thickness,
         _ => 1.0,
     };
-    let balls = TangentBalls::new(mesh);
-    let inscribed = inscribed(mesh, &balls, options.wall_samples);
-    let sides = Walls::new(&balls, &inscribed);
-    let steps = transitions(&sides);
+    let (steps, inner_edges, junctions) =
+        with_walls(mesh, options.wall_samples, |balls, inscribed, walls| {
+            let [share, width] = [rules.rounding(), rules.hole()].map(|rule| rule.value);
+            (
+                transitions(walls),
+                inner_edges(balls, inscribed, walls, share, width),
+                junctions(balls, inscribed),
+            )
+        });
     let steep = steps.get((options.exempt * steps.len() as f64) as usize);
     let mut out = Mould {
         draw,
@@ -333,14 +339,8 @@ pub fn mould(
         min_wall: pick(options.exempt).map(|wall| wall.thickness),
         wall_ratio: ratio,
         transition: steep.map_or(0.0, |s| s.1),
-        inner_edges: inner_edges(
-            &balls,
-            &inscribed,
-            &sides,
-            rules.rounding().value,
-            rules.hole().value,
-        ),
-        junctions: junctions(&balls, &inscribed),
+        inner_edges,
+        junctions,
         ..Mould::default()
     };
     let places = sheet::Places {

@@ -78,7 +78,7 @@ const TWO_SIDES: f64 = -0.966;
 /// Two walls are one when their normals differ by less than 20 degrees (cosine).
 const SAME: f64 = 0.94;
 
-/// Balls whose two touches are the two sides of one wall.
+/// Balls whose two touches are the two sides of one wall, along x.
 pub struct Walls<'a>(Vec<(&'a Inscribed, Vec3)>);
 
 /// Normals of one side of a wall differ by less than this (cosine of 37 degrees).
@@ -86,26 +86,40 @@ const ALONG: f64 = 0.8;
 
 impl<'a> Walls<'a> {
     /// Those of the inscribed balls that lie in walls.
-    pub fn new(balls: &TangentBalls, inscribed: &'a [Inscribed]) -> Self {
+    fn new(balls: &TangentBalls, inscribed: &'a [Inscribed]) -> Self {
         let opposite = |i: &&Inscribed| {
             let [one, two] = [i.place, i.ball.touch].map(|p| p - i.ball.centre);
             one.dot(&two) < TWO_SIDES * one.norm() * two.norm()
         };
         let walls = inscribed.iter().filter(opposite);
-        Self(
-            walls
-                .map(|i| (i, balls.normals[i.triangle as usize]))
-                .collect(),
-        )
+        let walls = walls.map(|i| (i, balls.normals[i.triangle as usize]));
+        let mut walls: Vec<(&Inscribed, Vec3)> = walls.collect();
+        walls.sort_by(|a, b| a.0.place.x.total_cmp(&b.0.place.x));
+        Self(walls)
     }
 
     /// Thickness of the wall that has a place of the surface with this normal on one of its sides, mm: measured where the side is nearest; none
     /// where no wall is.
     pub fn thickness(&self, place: &Vec3, normal: &Vec3) -> Option<f64> {
-        let along = self.0.iter().filter(|(_, n)| n.dot(normal) > ALONG);
-        let away = |i: &Inscribed| (i.place - place).norm_squared();
-        let nearest = along.min_by(|a, b| away(a.0).total_cmp(&away(b.0)));
-        nearest.map(|(i, _)| 2.0 * i.ball.radius)
+        let mut nearest = (f64::INFINITY, None);
+        let middle = self.0.partition_point(|w| w.0.place.x < place.x);
+        // Away from the place along x, as far as something nearer may come.
+        let (up, down) = (self.0[middle..].iter(), self.0[..middle].iter().rev());
+        for way in [
+            &mut up.into_iter() as &mut dyn Iterator<Item = _>,
+            &mut down.into_iter(),
+        ] {
+            for (wall, side) in way {
+                if (wall.place.x - place.x).powi(2) > nearest.0 {
+                    break;
+                }
+                let away = (wall.place - place).norm_squared();
+                if away < nearest.0 && side.dot(normal) > ALONG {
+                    nearest = (away, Some(2.0 * wall.ball.radius));
+                }
+            }
+        }
+        nearest.1
     }
 
     /// Sum of the thickness of the two walls that meet in an edge at a place, mm; none where no wall is. `balls` are those of the surface.
@@ -118,6 +132,18 @@ impl<'a> Walls<'a> {
         let other = self.thickness(place, &balls.normals[second.triangle as usize]);
         Some(one.or(other)? + other.or(one)?)
     }
+}
+
+/// What `look` finds by the balls of a surface, its inscribed balls at `samples` places, and its walls.
+pub fn with_walls<R>(
+    mesh: &TriMesh,
+    samples: usize,
+    look: impl FnOnce(&TangentBalls, &[Inscribed], &Walls) -> R,
+) -> R {
+    let balls = TangentBalls::new(mesh);
+    let inscribed = inscribed(mesh, &balls, samples);
+    let walls = Walls::new(&balls, &inscribed);
+    look(&balls, &inscribed, &walls)
 }
 
 /// How steeply walls change, steepest first: the place, and change of thickness over the way along the wall.

@@ -66,11 +66,16 @@ pub(super) fn add_feeders(
     Ok(feeders)
 }
 
+/// Height of a point over a foot and its distance from the feeder's axis, mm.
+fn from_foot(p: &Vec3, foot: &Vec3, up: &Vec3) -> (f64, f64) {
+    let along = (p - foot).dot(up);
+    (along, (p - foot - along * up).norm())
+}
+
 /// Depth in the metal between a foot and the part below it; negative infinity where the part does not follow.
 fn below(p: &Vec3, feeder: &(Vec3, f64), up: &Vec3, part: &VoxelGrid<f32>) -> f64 {
     let (foot, diameter) = feeder;
-    let along = (p - foot).dot(up);
-    let radial = (p - foot - along * up).norm();
+    let (along, radial) = from_foot(p, foot, up);
     let (inside, left) = (diameter / 2.0 - radial, FOOT * diameter + along);
     if along >= 0.0 || inside <= 0.0 || left <= 0.0 {
         return f64::NEG_INFINITY;
@@ -107,16 +112,12 @@ fn roomy(field: &VoxelGrid<f32>, feeders: &[(Vec3, f64)], up: &Vec3) -> VoxelGri
 
 /// Depth in a feeder: a cylinder from its foot to one diameter above.
 fn cylinder(p: &Vec3, (foot, diameter): &(Vec3, f64), up: &Vec3) -> f64 {
-    let along = (p - foot).dot(up);
-    let radial = (p - foot - along * up).norm();
+    let (along, radial) = from_foot(p, foot, up);
     (diameter / 2.0 - radial).min(diameter - along).min(along)
 }
 
 /// Whether a point lies in a feeder or in reach below its foot.
 pub(super) fn in_feeder(p: &Vec3, (foot, diameter): &(Vec3, f64), up: &Vec3) -> bool {
-    let reach = FOOT * diameter;
-    let (foot, height) = (foot - reach * up, diameter + reach);
-    let along = (p - foot).dot(up);
-    let radial = (p - foot - along * up).norm();
-    radial < diameter / 2.0 && along > 0.0 && along < height
+    let (along, radial) = from_foot(p, foot, up);
+    radial < diameter / 2.0 && along > -FOOT * diameter && along < *diameter
 }
