@@ -11,8 +11,8 @@ use rayon::prelude::*;
 
 use grassfire::Vec3;
 use grassfire::casting::feed::{FeedOptions, feed, place_feeders};
-use grassfire::casting::mould::best_direction;
-use grassfire::casting::mould::directions::{SLACK, judge, spiral};
+use grassfire::casting::mould::directions::{FINER, allowed, best_of, judge, spiral};
+use grassfire::casting::mould::{Direction, best_direction};
 use grassfire::casting::solidify::{SolidifyOptions, solidify};
 use grassfire::io::{Input, ReadOptions, read_input};
 use grassfire::mesh::TriMesh;
@@ -151,7 +151,10 @@ fn draw_search() {
 /// Directions a degree apart on a half-space: 2 pi / (pi / 180)^2.
 const ALL: usize = 20_626;
 
-/// The search of `grassfire mould` beside all directions, with the same lines and the same order.
+/// So many of the best of all are judged on the search's finest lattice: what the lines above cannot tell apart.
+const CLOSE: usize = 300;
+
+/// The search of `grassfire mould` beside all directions, by the same order on the same lines.
 fn draw_beside_all(part: &str) {
     let read = read_input(
         Path::new(part),
@@ -167,16 +170,26 @@ fn draw_beside_all(part: &str) {
     let found = best_direction(&mesh, 300, lines, draft, &Monitor::default()).expect("in time");
     let searched = clock.elapsed().as_secs_f64();
     let clock = Instant::now();
-    let slack = SLACK * mesh.volume().abs();
-    let all = spiral(ALL).into_par_iter();
-    let best = all.map(|draw| judge(&mesh, &draw, lines, draft));
-    let best = best.min_by(|a, b| a.compare(b, slack)).expect("some");
+    let look = |draws: &[Vec3], lines: usize| -> Vec<Direction> {
+        let seen = draws
+            .par_iter()
+            .map(|draw| judge(&mesh, draw, lines, draft));
+        seen.collect()
+    };
+    let all = look(&spiral(ALL), lines);
+    let close = best_of(&all, allowed(&all, &mesh, lines), CLOSE);
+    let close: Vec<Vec3> = close.iter().map(|d| d.draw).collect();
+    let mut last = look(&close, FINER * lines);
+    last.push(found);
+    let equal = allowed(&last, &mesh, FINER * lines);
+    last.pop();
+    let best = best_of(&last, equal, 1)[0];
     let angle = |a: &Vec3, b: &Vec3| a.dot(b).abs().min(1.0).acos().to_degrees();
     println!(
         "{part}: search {searched:.1} s, all {:.1} s, {:.2} degrees apart, search {:?} than all",
         clock.elapsed().as_secs_f64(),
         angle(&found.draw, &best.draw),
-        found.compare(&best, slack)
+        found.compare(&best, equal)
     );
     for direction in [found, best] {
         let [x, y, z]: [f64; 3] = direction.draw.into();
