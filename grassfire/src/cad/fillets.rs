@@ -44,7 +44,7 @@ const TOGETHER: &str = "it does not go together with the others";
 /// 3. Those that passed are made together; where these do not pass, one after another.
 /// 4. The part is inspected anew; when a non-design body is not kept any more, the whole part stays as it was.
 ///
-/// The kernel gives up on many edges that end in corners: these stay sharp, with the reason. It has `fillet_seconds` for each.
+/// The kernel gives up on many edges that end in corners: these stay sharp, with the reason. It has `fillet_seconds` for each fillet.
 ///
 /// # Errors
 /// [`CadError::Kernel`], [`CadError::Cancelled`].
@@ -60,50 +60,22 @@ pub fn round_edges(
         return Ok((solid, fillets));
     }
     let sharp = Sharp::new(&solid, options, monitor)?;
-    let mut passed: Vec<(&[u32], f64)> = Vec::new();
     let contours = sharp.contours()?;
+    let mut passed: Vec<(&[u32], f64)> = Vec::new();
+    let mut made = None;
     for (k, contour) in contours.iter().enumerate() {
         monitor.step("cad", "fillets", k as f64 / contours.len() as f64)?;
         let mut fillet = sharp.described(contour);
         fillet.wanted = radius_at(&fillet.place);
-        for share in SHARES {
-            let radius = share * fillet.wanted;
-            match sharp.rounded(&[(contour, radius)]) {
-                Ok(_) => {
-                    fillet.radius = Some(radius);
-                    passed.push((contour, radius));
-                    break;
-                }
-                // What takes hours with one radius takes them with the next.
-                Err(reason) if reason.contains(TOO_LONG) => {
-                    fillet.reason = Some(reason);
-                    break;
-                }
-                Err(reason) => fillet.reason = Some(reason),
-            }
-            monitor.check()?;
+        if let Some((radius, alone)) = sharp.largest(contour, &mut fillet)? {
+            passed.push((contour, radius));
+            made = Some(alone);
         }
         fillets.push(fillet);
     }
-    let mut made = sharp.rounded(&passed).ok();
-    if made.is_none() {
-        let mut together = Vec::new();
-        for (fillet, one) in fillets
-            .iter_mut()
-            .filter(|f| f.radius.is_some())
-            .zip(passed)
-        {
-            together.push(one);
-            match sharp.rounded(&together) {
-                Ok(result) => made = Some(result),
-                Err(_) => {
-                    together.pop();
-                    fillet.radius = None;
-                    fillet.reason = Some(TOGETHER.to_owned());
-                }
-            }
-            monitor.check()?;
-        }
+    // One alone is there already.
+    if passed.len() > 1 {
+        made = sharp.together(&passed, &mut fillets)?;
     }
     let Some((made, volume)) = made else {
         return Ok((solid, fillets));
@@ -118,6 +90,20 @@ pub fn round_edges(
         return Ok((solid, fillets));
     }
     Ok((rounded, fillets))
+}
+
+/// Whether an edge is a sharp inner one between the fitted body and a non-design body.
+fn sharp_between(edge: &Edge, sources: &[FaceSource]) -> bool {
+    let source = |f: u32| sources.get(f as usize);
+    let sides = edge.faces.map(|[a, b]| [source(a), source(b)]);
+    let between = matches!(
+        sides,
+        Some(
+            [Some(FaceSource::Organic), Some(FaceSource::Body(_))]
+                | [Some(FaceSource::Body(_)), Some(FaceSource::Organic)]
+        )
+    );
+    between && edge.concave && edge.angle.is_some_and(|angle| angle > FLAT)
 }
 
 /// Samples of a face that tell whether it still lies on its body.
@@ -147,6 +133,9 @@ fn sources(
     made.origins.iter().enumerate().map(source).collect()
 }
 
+/// A part with fillets, and its volume, mm3.
+type Made = (FilletResult, f64);
+
 /// A part with sharp inner edges.
 struct Sharp<'a> {
     solid: &'a CadSolid,
@@ -169,26 +158,66 @@ impl<'a> Sharp<'a> {
         })
     }
 
-    /// An inner edge between the fitted body and a non-design body.
-    fn wanted(&self, edge: &Edge) -> bool {
-        let source = |f: u32| self.solid.sources.get(f as usize);
-        let sides = edge.faces.map(|[a, b]| [source(a), source(b)]);
-        let between = matches!(
-            sides,
-            Some(
-                [Some(FaceSource::Organic), Some(FaceSource::Body(_))]
-                    | [Some(FaceSource::Body(_)), Some(FaceSource::Organic)]
-            )
-        );
-        between && edge.concave && edge.angle.is_some_and(|angle| angle > FLAT)
+    /// The largest fillet that the kernel makes alone, with its radius.
+    fn largest(
+        &self,
+        contour: &[u32],
+        fillet: &mut Fillet,
+    ) -> Result<Option<(f64, Made)>, CadError> {
+        for share in SHARES {
+            let radius = share * fillet.wanted;
+            match self.rounded(&[(contour, radius)]) {
+                Ok(made) => {
+                    fillet.radius = Some(radius);
+                    return Ok(Some((radius, made)));
+                }
+                Err(reason) => {
+                    // What takes hours with one radius takes them with the next.
+                    let hopeless = reason.contains(TOO_LONG);
+                    fillet.reason = Some(reason);
+                    if hopeless {
+                        break;
+                    }
+                }
+            }
+            self.monitor.check()?;
+        }
+        Ok(None)
     }
 
-    /// Such edges, those together that run on smoothly, longest first.
+    /// All fillets that passed alone; where these do not pass, as many as do, one after another.
+    fn together(
+        &self,
+        passed: &[(&[u32], f64)],
+        fillets: &mut [Fillet],
+    ) -> Result<Option<Made>, CadError> {
+        if let Ok(made) = self.rounded(passed) {
+            return Ok(Some(made));
+        }
+        let mut made = None;
+        let mut together = Vec::new();
+        let alone = fillets.iter_mut().filter(|f| f.radius.is_some());
+        for (fillet, one) in alone.zip(passed) {
+            together.push(*one);
+            match self.rounded(&together) {
+                Ok(result) => made = Some(result),
+                Err(_) => {
+                    together.pop();
+                    fillet.radius = None;
+                    fillet.reason = Some(TOGETHER.to_owned());
+                }
+            }
+            self.monitor.check()?;
+        }
+        Ok(made)
+    }
+
+    /// Sharp inner edges between fitted body and non-design bodies, those together that run on smoothly, longest first.
     fn contours(&self) -> Result<Vec<Vec<u32>>, OcctError> {
         let mut seen = vec![false; self.edges.len()];
         let mut out = Vec::new();
         for e in 0..self.edges.len() {
-            if seen[e] || !self.wanted(&self.edges[e]) {
+            if seen[e] || !sharp_between(&self.edges[e], &self.solid.sources) {
                 continue;
             }
             let contour = self.solid.shape.fillet_contour(e as u32)?;
@@ -227,12 +256,13 @@ impl<'a> Sharp<'a> {
     }
 
     /// The part with fillets, and its volume, when it passes all checks.
-    fn rounded(&self, contours: &[(&[u32], f64)]) -> Result<(FilletResult, f64), String> {
+    fn rounded(&self, contours: &[(&[u32], f64)]) -> Result<Made, String> {
         let text = |e: OcctError| e.0;
         let starts: Vec<(u32, f64)> = contours.iter().map(|(c, r)| (c[0], *r)).collect();
         let stop = || self.monitor.check().is_err();
         let shape = &self.solid.shape;
-        let made = shape.fillet(&starts, self.seconds, &stop).map_err(text)?;
+        let seconds = self.seconds * contours.len() as f64;
+        let made = shape.fillet(&starts, seconds, &stop).map_err(text)?;
         self.checked(&made.shape)?;
         let volume = made.shape.volume(VOLUME_EPS).map_err(text)?;
         let added = volume - self.solid.volume;

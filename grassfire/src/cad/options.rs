@@ -52,7 +52,7 @@ pub struct CadOptions {
     /// Fillets at the inner edges between the fitted body and non-design bodies: a radius in mm, `rule` or `off`. Where the kernel
     /// finds none, smaller ones are tried.
     pub fillet: FilletRadius,
-    /// A fillet that takes the kernel more processor time than this stays away, s.
+    /// A fillet that takes the kernel more processor time than this stays away, s; several together have as many times as much.
     pub fillet_seconds: f64,
 }
 
