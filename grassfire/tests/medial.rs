@@ -124,6 +124,32 @@ fn plate_keeps_its_extent_and_thickness() {
 }
 
 #[test]
+fn a_short_thick_neck_between_plates_became_a_beam() {
+    // The neck is 1.8 times as wide as it is thick; where it is long it is a member.
+    let beams = |length: f64, neck_length: f64| {
+        let plate = |p: Vec3, x: f64| block(p, [x, 19.5, 6.5], [12.0, 16.0, 3.0]);
+        let neck = [0.5 * length + 2.0, 5.4, 3.0];
+        let field = grid([54 + length as usize, 40, 14], |p| {
+            plate(p, 14.5).max(plate(p, 38.5 + length)).max(block(
+                p,
+                [26.5 + 0.5 * length, 19.5, 6.5],
+                neck,
+            ))
+        });
+        let options = MedialOptions {
+            sheet_ratio: 1.4,
+            neck_length,
+            ..MedialOptions::default()
+        };
+        let result = medial_axis(&field, &options, &Monitor::default()).expect("a medial axis");
+        result.mesh.edges.len()
+    };
+    assert!(beams(10.0, 0.0) > 10);
+    assert_eq!(beams(10.0, 5.0), 0);
+    assert!(beams(40.0, 5.0) > 10);
+}
+
+#[test]
 fn branches_and_seams() {
     let tee = |p: Vec3| {
         block(p, [24.5, 19.5, 6.5], [20.0, 15.0, 2.5]).max(block(
@@ -299,6 +325,8 @@ proptest! {
         let options = MedialOptions {
             sheet_noise: o[0],
             sheet_ratio: o[1],
+            neck_length: 2.0 * o[6],
+            neck_ratio: o[7],
             ribbon_ratio: o[2],
             regrow_sine: 0.3 * o[3],
             island_ratio: o[4],

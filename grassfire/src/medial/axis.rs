@@ -2,10 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::burn::{Alive, FaceSpheres, burn, distance, regrow};
+use super::burn::{Alive, Collapse, FaceSpheres, burn, distance, regrow};
 use super::complex::Complex;
 use super::curves::{prune_curves, trim_tips};
 use super::delaunay::{NONE, delaunay_lattice};
+use super::necks::add_necks;
 use super::refit::refit;
 use super::union_find::UnionFind;
 use super::voxel_solid::VoxelSolid;
@@ -16,6 +17,8 @@ use crate::topology::Betti;
 use crate::voxel::VoxelGrid;
 
 const STAGE: &str = "medial";
+/// How often necks are looked for, at most.
+const NECK_ROUNDS: usize = 3;
 
 /// The pruned medial axis of the solid where `field` is above zero (mm; a signed distance, or any
 /// smooth field that grows inwards).
@@ -25,7 +28,8 @@ const STAGE: &str = "medial";
 /// 2. Exact Delaunay triangulation of the corners ([`delaunay_lattice`]).
 /// 3. The Voronoi complex inside the solid, with the homotopy type of the solid: checked.
 /// 4. Burn it once to find the erosion thickness (how much longer than its radius a place lasts),
-///    then burn it again, stopping where the thickness is above max(`sheet_noise`, `sheet_ratio` R).
+///    then burn it again, stopping where the thickness is above max(`sheet_noise`, `sheet_ratio` R). Where that leaves a
+///    curve between sheets shorter than `neck_length` R, once more with `neck_ratio` there: a short neck stays a sheet.
 ///    Sheets whose thickness stays below `ribbon_ratio` R burn to curves. Rims grow back where the
 ///    object angle is wide. Small islands burn to curves too. Dangling curves go when thin at their root.
 ///    Everything is elementary collapses, so the homotopy type cannot change, whatever the options are.
@@ -120,7 +124,8 @@ fn prune(
     monitor: &Monitor,
 ) -> Result<(Alive, Vec<u32>), MedialError> {
     monitor.step(STAGE, "burning", 0.5)?;
-    let limit = |f: u32| options.sheet_limit(spheres.radii[f as usize]);
+    let radius = |f: u32| spheres.radii[f as usize];
+    let limit = |f: u32| options.sheet_limit(radius(f));
     let mut alive = Alive::all(complex);
     let (full, pruning) = rayon::join(
         || {
@@ -135,25 +140,78 @@ fn prune(
         || burn(complex, spheres, &mut alive, limit, monitor),
     );
     let (times, collapses) = (full?.0, pruning?.1);
-    monitor.step(STAGE, "sheets", 0.75)?;
-    let ribbon = ribbons(complex, spheres, &alive, &times, options);
-    burn(complex, spheres, &mut alive, only(&ribbon), monitor)?;
-    regrow(
+    let pruning = Pruning {
         complex,
         spheres,
         samples,
-        &times,
-        &mut alive,
-        &collapses,
-        options.regrow_sine,
-    );
-    drop((times, collapses));
-    let island = islands(complex, spheres, &alive, options);
-    burn(complex, spheres, &mut alive, only(&island), monitor)?;
-    monitor.step(STAGE, "curves", 0.85)?;
-    let points = prune_curves(complex, &mut alive, |r| options.curve_limit(r));
-    trim_tips(complex, &mut alive, |r| options.tip_limit(r));
+        times,
+        options,
+        monitor,
+    };
+    let mut points = pruning.finish(&mut alive, collapses)?;
+    let mut neck = vec![false; complex.faces()];
+    // A neck that came back as a sheet may leave a shorter one at its ends.
+    for _ in 0..NECK_ROUNDS {
+        if options.neck_length <= 0.0
+            || !add_necks(complex, spheres, &alive, options.neck_length, &mut neck)
+        {
+            break;
+        }
+        let limit = |f: u32| {
+            if neck[f as usize] {
+                options.neck_limit(radius(f))
+            } else {
+                limit(f)
+            }
+        };
+        alive = Alive::all(complex);
+        let (_, collapses) = burn(complex, spheres, &mut alive, limit, monitor)?;
+        points = pruning.finish(&mut alive, collapses)?;
+    }
     Ok((alive, points))
+}
+
+/// What pruning needs once the complex was burnt.
+struct Pruning<'a> {
+    complex: &'a Complex,
+    spheres: &'a FaceSpheres,
+    samples: &'a [[i32; 3]],
+    /// When each face burns in the full burn.
+    times: Vec<f32>,
+    options: &'a MedialOptions,
+    monitor: &'a Monitor,
+}
+
+impl Pruning<'_> {
+    /// Ribbons and islands to curves, rims back, dangling curves away.
+    fn finish(&self, alive: &mut Alive, collapses: Vec<Collapse>) -> Result<Vec<u32>, MedialError> {
+        let Self {
+            complex,
+            spheres,
+            options,
+            monitor,
+            ..
+        } = *self;
+        monitor.step(STAGE, "sheets", 0.75)?;
+        let ribbon = ribbons(complex, spheres, alive, &self.times, options);
+        burn(complex, spheres, alive, only(&ribbon), monitor)?;
+        regrow(
+            complex,
+            spheres,
+            self.samples,
+            &self.times,
+            alive,
+            &collapses,
+            options.regrow_sine,
+        );
+        drop(collapses);
+        let island = islands(complex, spheres, alive, options);
+        burn(complex, spheres, alive, only(&island), monitor)?;
+        monitor.step(STAGE, "curves", 0.85)?;
+        let points = prune_curves(complex, alive, |r| options.curve_limit(r));
+        trim_tips(complex, alive, |r| options.tip_limit(r));
+        Ok(points)
+    }
 }
 
 /// Faces of sheets that are nowhere thicker than `ribbon_ratio` times their radius.

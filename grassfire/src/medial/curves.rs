@@ -223,13 +223,13 @@ impl Anchor {
 }
 
 /// Curve edges at each vertex.
-struct Incidence {
+pub(super) struct Incidence {
     start: Vec<u32>,
     edges: Vec<u32>,
 }
 
 impl Incidence {
-    fn of(complex: &Complex, wanted: &[bool]) -> Self {
+    pub(super) fn of(complex: &Complex, wanted: &[bool]) -> Self {
         let mut start = vec![0u32; complex.radii.len() + 1];
         let ends = || {
             complex
@@ -252,7 +252,7 @@ impl Incidence {
         Self { start, edges }
     }
 
-    fn edges(&self, v: u32) -> &[u32] {
+    pub(super) fn edges(&self, v: u32) -> &[u32] {
         &self.edges[self.start[v as usize] as usize..self.start[v as usize + 1] as usize]
     }
 }

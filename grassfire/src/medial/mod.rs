@@ -5,6 +5,7 @@ mod burn;
 mod complex;
 mod curves;
 mod delaunay;
+mod necks;
 mod options;
 mod poles;
 mod predicates;

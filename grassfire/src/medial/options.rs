@@ -18,6 +18,10 @@ pub struct MedialOptions {
     pub sheet_noise: f64,
     /// Least erosion thickness of a sheet as a multiple of its radius.
     pub sheet_ratio: f64,
+    /// A curve between sheets that is shorter than this multiple of its radius is a neck; 0 looks for none.
+    pub neck_length: f64,
+    /// Least erosion thickness of a sheet at a neck as a multiple of its radius, if that is less than `sheet_ratio`.
+    pub neck_ratio: f64,
     /// A sheet whose erosion thickness is below this multiple of its radius everywhere becomes a curve.
     pub ribbon_ratio: f64,
     /// Sine of half the object angle above which burnt rims grow back.
@@ -42,6 +46,8 @@ impl Default for MedialOptions {
         Self {
             sheet_noise: 2.5,
             sheet_ratio: 0.75,
+            neck_length: 0.0,
+            neck_ratio: 0.8,
             ribbon_ratio: 2.0,
             regrow_sine: 0.75,
             island_ratio: 3.0,
@@ -60,6 +66,11 @@ impl MedialOptions {
         (self.sheet_noise as f32).max(self.sheet_ratio as f32 * r)
     }
 
+    /// The same at a neck.
+    pub(super) fn neck_limit(&self, r: f32) -> f32 {
+        (self.sheet_noise as f32).max(self.neck_ratio.min(self.sheet_ratio) as f32 * r)
+    }
+
     /// Erosion thickness (voxels) up to which a curve of radius `r` (voxels) at its root burns.
     pub(super) fn curve_limit(&self, r: f32) -> f32 {
         (self.curve_noise as f32).max(self.curve_ratio as f32 * r)
@@ -74,6 +85,8 @@ impl MedialOptions {
         let options = [
             ("sheet_noise", self.sheet_noise),
             ("sheet_ratio", self.sheet_ratio),
+            ("neck_length", self.neck_length),
+            ("neck_ratio", self.neck_ratio),
             ("ribbon_ratio", self.ribbon_ratio),
             ("regrow_sine", self.regrow_sine),
             ("island_ratio", self.island_ratio),

@@ -14,7 +14,7 @@ use super::members::burn_members;
 use super::pairing::{make_even, pair, split_all, split_rims};
 use super::polygons::Polygon;
 use super::quad_mesh::QuadMesh;
-use super::reduce::{collapse_short, prune_spurs};
+use super::reduce::{SpurLimits, collapse_short, prune_spurs};
 use super::reference::Reference;
 use super::shape_cost::settle;
 use super::split_chords::split_chords;
@@ -31,6 +31,10 @@ const STAGE: &str = "skeleton";
 
 /// Smoothing rounds after rows of quads were split.
 const SETTLE_ROUNDS: usize = 5;
+
+/// A dangling beam is slight when it has less material outside of its root's sphere than this many such spheres: on real parts
+/// remnants beside bodies that were cut out have up to 2.5, members at least 4.
+const SLIGHT: f64 = 3.0;
 
 /// How the skeleton is meshed. Lengths without a unit are multiples of the local radius (half the thickness).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -55,6 +59,9 @@ pub struct SkeletonOptions {
     pub member_size: f64,
     /// Dangling beams that stick out of their root's sphere by less than this many radii go.
     pub spur: f64,
+    /// So do those, once narrow sheets are beams, that have little material and stick out by less than this many radii: what tapers
+    /// off beside a non-design body. 0 keeps them.
+    pub slight_spur: f64,
     /// Smoothing rounds along rims, seams and beams.
     pub smoothing: usize,
     /// Searches for quads with few irregular vertices; the best one counts, 0 leaves the quads as matched.
@@ -75,6 +82,7 @@ impl Default for SkeletonOptions {
             member_width: 1.2,
             member_size: 4.0,
             spur: 0.6,
+            slight_spur: 0.0,
             smoothing: 80,
             searches: 4,
             seed: 1,
@@ -111,6 +119,7 @@ impl SkeletonOptions {
         not_negative("skeleton.member_width", self.member_width)?;
         not_negative("skeleton.member_size", self.member_size)?;
         not_negative("skeleton.spur", self.spur)?;
+        not_negative("skeleton.slight_spur", self.slight_spur)?;
         inside(
             self.searches <= 1000,
             "skeleton.searches",
@@ -174,11 +183,13 @@ pub fn quad_skeleton(
         burn_members(&mut c, unit, options, monitor)?;
         verify("burning members", c.betti())?;
         // Burning leaves a branch for every corner of the sheet: those are not members.
-        prune_spurs(
-            &mut c,
-            3.0 * unit,
-            (2.0 * options.spur).max(1.2 + options.member_width),
-        );
+        let limits = SpurLimits {
+            absolute: 3.0 * unit,
+            relative: (2.0 * options.spur).max(1.2 + options.member_width),
+            relative_slight: options.slight_spur,
+            balls: SLIGHT,
+        };
+        prune_spurs(&mut c, &limits);
         c.compact();
         collapse_short(&mut c, 0.6 * unit, unit, 2, monitor)?;
         let traced = arcs::trace(&c);
@@ -294,7 +305,12 @@ fn clean(
 ) -> Result<(), SkeletonError> {
     for (length, rounds) in [(0.9, 4), (0.6, 2)] {
         collapse_short(c, length * unit, unit, rounds, monitor)?;
-        prune_spurs(c, 2.5 * unit, options.spur);
+        let limits = SpurLimits {
+            absolute: 2.5 * unit,
+            relative: options.spur,
+            ..SpurLimits::default()
+        };
+        prune_spurs(c, &limits);
         c.compact();
         let traced = arcs::trace(c);
         monitor.check()?;

@@ -7,7 +7,7 @@
 //! 4. Relax; every vertex is put back onto its fine rim, seam, beam or sheet.
 
 use super::complex::{Class, Complex};
-use super::reduce::prune_spurs;
+use super::reduce::{SpurLimits, prune_spurs};
 use super::reference::Reference;
 use crate::Vec3;
 use crate::monitor::{Cancelled, Monitor};
@@ -73,7 +73,14 @@ pub(crate) fn coarsen(
             relax(c, reference);
         }
         if round == 4 {
-            prune_spurs(c, 3.0 * unit, 0.8);
+            prune_spurs(
+                c,
+                &SpurLimits {
+                    absolute: 3.0 * unit,
+                    relative: 0.8,
+                    ..SpurLimits::default()
+                },
+            );
             c.compact();
         }
     }

@@ -64,16 +64,39 @@ fn try_collapse(c: &mut Complex, a: u32, b: u32, l: f64, length: f64, unit: f64)
     false
 }
 
+/// Up to where a dangling beam is a spur.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct SpurLimits {
+    /// Its ball sticks out of the root's ball by less than this, mm.
+    pub absolute: f64,
+    /// The same over the radius of the root's ball.
+    pub relative: f64,
+    /// The same for one that is slight: what tapers off beside a body that was cut out comes and goes with the voxel.
+    pub relative_slight: f64,
+    /// It is slight when it has less material outside of the root's ball than this many balls of the root's radius.
+    pub balls: f64,
+}
+
 /// A dangling chain of beams, tip first.
 struct Spur {
     protrusion: f64,
+    /// Material outside of the root's ball, mm3.
+    volume: f64,
     path: Vec<u32>,
 }
 
-/// Removes dangling beams whose ball sticks out of the root's ball by less than `max(absolute, relative * r_root)`,
-/// again and again until none is left. A component never vanishes: a chain with two free ends stays.
-/// Returns how many spurs went.
-pub(crate) fn prune_spurs(c: &mut Complex, absolute: f64, relative: f64) -> usize {
+impl Spur {
+    fn within(&self, limits: &SpurLimits, root: f64) -> bool {
+        let ball = 4.0 / 3.0 * std::f64::consts::PI * root.powi(3);
+        let slight = self.volume < limits.balls * ball;
+        self.protrusion < limits.absolute.max(limits.relative * root)
+            || slight && self.protrusion < limits.relative_slight * root
+    }
+}
+
+/// Removes dangling beams within `limits`, again and again until none is left. A component never vanishes: a chain with
+/// two free ends stays. Returns how many spurs went.
+pub(crate) fn prune_spurs(c: &mut Complex, limits: &SpurLimits) -> usize {
     let mut removed = 0;
     loop {
         let mut spurs: Vec<Spur> = (0..c.points.len() as u32)
@@ -81,7 +104,7 @@ pub(crate) fn prune_spurs(c: &mut Complex, absolute: f64, relative: f64) -> usiz
             .filter_map(|tip| spur_from(c, tip))
             .filter(|s| {
                 let root = s.path[s.path.len() - 1];
-                s.protrusion < absolute.max(relative * c.radii[root as usize])
+                s.within(limits, c.radii[root as usize])
             })
             .collect();
         if spurs.is_empty() {
@@ -141,8 +164,27 @@ fn spur_from(c: &Complex, tip: u32) -> Option<Spur> {
     }
     Some(Spur {
         protrusion: length + c.radii[tip as usize] - c.radii[root as usize],
+        volume: outside(c, &path),
         path,
     })
+}
+
+/// Volume of the tubes along a path as far as they lie outside of the ball at its end.
+fn outside(c: &Complex, path: &[u32]) -> f64 {
+    let root = path[path.len() - 1] as usize;
+    let tube = |pair: &[u32]| {
+        let [a, b] = [pair[0] as usize, pair[1] as usize];
+        let middle = (c.points[a] + c.points[b]) / 2.0;
+        let radius = (c.radii[a] + c.radii[b]) / 2.0;
+        let free = (middle - c.points[root]).norm() > c.radii[root];
+        let length = if free {
+            c.length(pair[0], pair[1])
+        } else {
+            0.0
+        };
+        std::f64::consts::PI * radius * radius * length
+    };
+    path.windows(2).map(tube).sum()
 }
 
 #[cfg(test)]
@@ -157,9 +199,47 @@ mod tests {
         let points = vec![x(-10.0, 0.0), x(0.0, 0.0), x(10.0, 0.0), x(0.0, 1.0)];
         let none: [[u32; 3]; 0] = [];
         let mut c = Complex::new(points, vec![2.0; 4], &none, &[[0, 1], [1, 2], [1, 3]]);
-        assert_eq!(prune_spurs(&mut c, 1.0, 0.6), 1);
+        let limits = |absolute| SpurLimits {
+            absolute,
+            relative: 0.6,
+            ..SpurLimits::default()
+        };
+        assert_eq!(prune_spurs(&mut c, &limits(1.0)), 1);
         assert_eq!(c.alive_beams().count(), 2);
-        assert_eq!(prune_spurs(&mut c, 1e9, 0.6), 0);
+        assert_eq!(prune_spurs(&mut c, &limits(1e9)), 0);
+    }
+
+    #[test]
+    fn tapering_remnants_beside_a_body_came_and_went_with_the_voxel() {
+        // Two spurs of eight radii on a bar: one tapers to a tenth of its radius, the other is as thick as the bar.
+        let x = |x: f64, y: f64| Vec3::new(x, y, 0.0);
+        let (mut points, mut radii) =
+            (vec![x(-40.0, 0.0), x(0.0, 0.0), x(40.0, 0.0)], vec![2.0; 3]);
+        let mut beams = vec![[0, 1], [1, 2]];
+        for side in [1.0, -1.0] {
+            for step in 1..=16u32 {
+                let tip = points.len() as u32;
+                beams.push([if step == 1 { 1 } else { tip - 1 }, tip]);
+                points.push(x(0.0, side * f64::from(step)));
+                let taper = if side > 0.0 {
+                    1.0 - 0.9 * f64::from(step) / 16.0
+                } else {
+                    1.0
+                };
+                radii.push(2.0 * taper);
+            }
+        }
+        let none: [[u32; 3]; 0] = [];
+        let mut c = Complex::new(points, radii, &none, &beams);
+        let limits = SpurLimits {
+            absolute: 1.0,
+            relative: 2.4,
+            relative_slight: 8.0,
+            balls: 3.0,
+        };
+        assert_eq!(prune_spurs(&mut c, &limits), 1);
+        c.compact();
+        assert!(c.points.iter().all(|p| p.y <= 0.0) && c.alive_beams().count() == 18);
     }
 
     #[test]
