@@ -9,9 +9,7 @@ use crate::report::Limits;
 pub(super) fn next_size(left: &mut Vec<f64>, best: Best, design_part: bool) -> Option<f64> {
     left.retain(|&size| worth_trying(size, best, design_part));
     let coarser = left.iter().position(|&size| size > 1.0);
-    let first = coarser
-        .filter(|_| matches!(best, Best::Unsound | Best::Torn))
-        .unwrap_or(0);
+    let first = coarser.filter(|_| best == Best::Unsound).unwrap_or(0);
     (first < left.len()).then(|| left.remove(first))
 }
 
@@ -20,10 +18,8 @@ pub(super) fn next_size(left: &mut Vec<f64>, best: Best, design_part: bool) -> O
 pub(super) enum Best {
     /// There is none.
     None,
-    /// It cuts itself or folds over.
+    /// It cuts itself, folds over or is torn.
     Unsound,
-    /// It is sound, but misses a member or a hole.
-    Torn,
     /// It misses a limit.
     Far,
     /// It is within all limits, but not close.
@@ -32,15 +28,13 @@ pub(super) enum Best {
 
 /// Whether a body with quads of `size` may be better than the best so far.
 ///
-/// Coarser quads may get rid of crossings, but never of distance; much finer ones mostly neither, since the fit splits quads that
-/// are too coarse, but they may bring a body closer that is near already, and are the last resort of one that is sound and too far off. Of a design
-/// part that cuts itself or is far off in two tries the whole proposal is the better next try.
+/// Coarser quads may get rid of crossings, but never of distance; much finer ones neither, since the fit splits quads that
+/// are too coarse; they may bring a body closer that is near already. Of a design part that cuts itself in two tries the whole proposal is the better next try.
 fn worth_trying(size: f64, best: Best, design_part: bool) -> bool {
     match best {
         Best::None => true,
         Best::Unsound => size >= FINE && !(design_part && size > 1.0),
-        Best::Torn => !design_part || (FINE..=1.0).contains(&size),
-        Best::Far => size <= 1.0 && (size >= FINE || !design_part),
+        Best::Far => (FINE..=1.0).contains(&size),
         Best::Rough => size <= 1.0,
     }
 }
@@ -244,16 +238,5 @@ mod tests {
         assert_eq!(next_size(&mut left, Best::Rough, true), Some(0.8));
         assert_eq!(next_size(&mut left, Best::Rough, true), Some(0.65));
         assert_eq!(next_size(&mut left, Best::Rough, true), None);
-    }
-
-    /// A filled wishbone missed an arm by five voxels with all quads down to 0.8; 0.65 were never tried.
-    #[test]
-    fn a_sound_body_that_missed_a_member_was_not_tried_with_much_finer_quads() {
-        let mut left = vec![0.8, 1.3, 0.65];
-        assert_eq!(next_size(&mut left, Best::Torn, false), Some(1.3));
-        assert_eq!(next_size(&mut left, Best::Torn, false), Some(0.8));
-        assert_eq!(next_size(&mut left, Best::Torn, false), Some(0.65));
-        let design = || vec![0.65, 1.3];
-        assert_eq!(next_size(&mut design(), Best::Torn, true), None);
     }
 }

@@ -240,8 +240,7 @@ impl Workshop<'_> {
             let best_so_far = match &best {
                 Err(_) => Best::None,
                 Ok((score, _)) if score.good() => Best::Rough,
-                Ok((score, _)) if score.sound() && score.torn() => Best::Torn,
-                Ok((score, _)) if score.sound() => Best::Far,
+                Ok((score, _)) if score.sound() && !score.torn() => Best::Far,
                 Ok(_) => Best::Unsound,
             };
             let Some(size) = next_size(&mut left, best_so_far, self.base.united.is_some()) else {
