@@ -55,7 +55,7 @@ struct Piece {
 /// 1. Pieces of upright walls (16 a quad) know from the proposal on which side of the parting they lie: along the draw direction its
 ///    field falls away from the parting. Pieces that overhang in the proposal, too, are left alone.
 /// 2. Rounds turn the pieces that lean inwards by less than half a degree (linearised, with a weight that grows), by the least
-///    move of control points, bent as little as possible. Steps are shortened where they would create an intersection or a fold.
+///    move of control points at the same volume, bent as little as possible. Steps are shortened where they would create an intersection or a fold.
 /// 3. The round with the least overhang is kept.
 ///
 /// `field` is the signed distance to the proposal, mm, positive inside.
@@ -72,6 +72,7 @@ pub fn leaned(
     let (surface, iso) = (Surface::new(&fitted.body, field)?, IsoSamples::default());
     let mut solver = Solver::new(surface, field, &iso, options)?;
     let start: Vec<Vec3> = mesh.points.iter().map(|p| field.to_grid(p)).collect();
+    solver.volume = Some(solver.surface.volume(&start));
     let mut least = solver.overhang(&start, draw);
     let mut found = Tangles::of(&solver, &start);
     let (mut here, mut best) = (start.clone(), None);
@@ -154,7 +155,7 @@ impl Solver<'_> {
         weight: f64,
     ) -> Result<Vec<Vec3>, String> {
         let at = self.surface.samples.apply(here);
-        let (_, areas) = self.surface.normals_and_areas(&at);
+        let (normals, areas) = self.surface.normals_and_areas(&at);
         let mean_area = areas.iter().sum::<f64>() / here.len().max(1) as f64;
         self.equations.clear();
         for (p, place) in start.iter().enumerate() {
@@ -170,7 +171,7 @@ impl Solver<'_> {
                 self.add_turn(&piece, here, &at, (draw, weight));
             }
         }
-        let mut points = self.equations.solve(&self.equations.factor()?)?;
+        let mut points = self.solution(&normals, &areas)?;
         for (p, from) in points.iter_mut().zip(start) {
             let way = *p - from;
             *p = from + way * (MOST / way.norm().max(1e-9)).min(1.0);

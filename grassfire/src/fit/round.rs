@@ -112,7 +112,7 @@ impl<'a> Solver<'a> {
 
     /// The solution of the equations; with a wanted volume the one that costs least among those that have it to first
     /// order (one Lagrange multiplier).
-    fn solution(&self, normals: &[Vec3], areas: &[f64]) -> Result<Vec<Vec3>, String> {
+    pub(super) fn solution(&self, normals: &[Vec3], areas: &[f64]) -> Result<Vec<Vec3>, String> {
         let factor = self.equations.factor()?;
         let mut points = self.equations.solve(&factor)?;
         let Some(wanted) = self.volume else {

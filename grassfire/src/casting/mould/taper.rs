@@ -21,6 +21,7 @@ pub(super) fn taper(field: &mut VoxelGrid<f32>, tangent: f64, parting: f64) {
             return;
         };
         let middle = wanted.clamp(first, last);
+        let before = line.to_vec();
         for k in 1..=middle {
             let grown = line[k - 1] + step;
             if line[k - 1] > far {
@@ -32,6 +33,13 @@ pub(super) fn taper(field: &mut VoxelGrid<f32>, tangent: f64, parting: f64) {
             if line[k + 1] > far {
                 line[k] = line[k].max(grown);
             }
+        }
+        // No wall widens by more than draft over its whole height, and what is far from all walls stays empty: else a film would
+        // grow over the mouth of a core.
+        let near = |f: &f32| *f > far;
+        let most = step * before.iter().filter(|f| near(f)).count() as f32;
+        for (value, old) in line.iter_mut().zip(before) {
+            *value = value.min(old + most);
         }
     });
 }
@@ -85,5 +93,26 @@ mod tests {
         let down = (20..34).all(|k| at(k + 1) < at(k));
         assert!(up && down);
         assert_eq!(multiple(&field), 0);
+    }
+
+    /// Draft put a film over the mouths of a bore that a core makes: a plate's holes were closed by it.
+    #[test]
+    fn no_film_grows_over_the_mouth_of_a_core() {
+        // A plate of 8 mm, drawn along its length; its hole counts as material, the air above it does not.
+        let mut field = VoxelGrid::filled(Vec3::zeros(), 1.0, [12, 3, 60], -9.0_f32);
+        for v in 0..field.values.len() {
+            let [i, _, k] = field.ijk(v);
+            let deep = 4.0 - (i as f32 - 5.5).abs();
+            let hole = 8.0 - (k as f32 - 30.0).abs();
+            let beside = if deep < 0.0 { -hole.max(0.0) } else { 0.0 };
+            field.values[v] = deep.min(beside + deep.min(0.5)).max(-3.0);
+        }
+        let before = field.clone();
+        taper(&mut field, 0.02, 30.0);
+        let at = |field: &VoxelGrid<f32>, k: usize| field.values[field.index(1, 1, k)];
+        assert!(at(&before, 10) > -1.0 && at(&before, 30) < -2.0);
+        // The plate's face rises by its draft, the mouth stays open.
+        assert!(at(&field, 20) > at(&before, 20) + 0.2, "{}", at(&field, 20));
+        assert!(at(&field, 30) < -1.5, "{}", at(&field, 30));
     }
 }
