@@ -50,7 +50,7 @@ struct Piece {
     area: f64,
 }
 
-/// The control mesh `mesh`, of the quads of `fitted`, with upright walls that do not overhang along `draw`; none where none does.
+/// The control mesh of a fitted body with upright walls that do not overhang along the unit vector `draw`; none where none does.
 ///
 /// 1. Pieces of upright walls (16 a quad) know from the proposal on which side of the parting they lie: along the draw direction its
 ///    field falls away from the parting. Pieces that overhang in the proposal, too, are left alone.
@@ -63,7 +63,6 @@ struct Piece {
 /// # Errors
 /// A mesh that cannot be subdivided, a system that cannot be factorised; cancelled.
 pub fn leaned(
-    mesh: &ControlMesh,
     fitted: &Fitted,
     (field, draw): (&VoxelGrid<f32>, &Vec3),
     options: &FitOptions,
@@ -71,7 +70,12 @@ pub fn leaned(
 ) -> Result<Option<ControlMesh>, FitError> {
     let (surface, iso) = (Surface::new(&fitted.body, field)?, IsoSamples::default());
     let mut solver = Solver::new(surface, field, &iso, options)?;
-    let start: Vec<Vec3> = mesh.points.iter().map(|p| field.to_grid(p)).collect();
+    let start: Vec<Vec3> = fitted
+        .mesh
+        .points
+        .iter()
+        .map(|p| field.to_grid(p))
+        .collect();
     solver.volume = Some(solver.surface.volume(&start));
     let mut least = solver.overhang(&start, draw);
     let mut found = Tangles::of(&solver, &start);
@@ -269,7 +273,8 @@ mod tests {
     #[test]
     fn waves_of_upright_walls_do_not_overhang_any_more() {
         let (mesh, field) = (wavy_block(), drafted());
-        let fitted = Fitted {
+        let fitted = |mesh: &ControlMesh| Fitted {
+            mesh: mesh.clone(),
             body: ThickenedBody {
                 mesh: mesh.clone(),
                 ..ThickenedBody::default()
@@ -278,7 +283,7 @@ mod tests {
         };
         let (options, monitor) = (FitOptions::default(), Monitor::default());
         let along = (&field, &Vec3::z());
-        let turned = leaned(&mesh, &fitted, along, &options, &monitor).expect("it can be solved");
+        let turned = leaned(&fitted(&mesh), along, &options, &monitor).expect("it can be solved");
         let turned = turned.expect("walls overhang");
         let (before, after) = (overhanging(&mesh), overhanging(&turned));
         assert!(before > 100.0, "{before} mm2 before");
@@ -286,7 +291,7 @@ mod tests {
         let moves = mesh.points.iter().zip(&turned.points);
         let most = moves.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         assert!(most < 0.5, "moved by {most} mm");
-        let again = leaned(&turned, &fitted, along, &options, &monitor).expect("it can be solved");
+        let again = leaned(&fitted(&turned), along, &options, &monitor).expect("it can be solved");
         let left = again.map_or(after, |mesh| overhanging(&mesh));
         assert!(left <= after, "{left} of {after} mm2");
     }

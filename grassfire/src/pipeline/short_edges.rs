@@ -4,7 +4,6 @@ use super::construct::Site;
 use super::error::{PipelineError, StageError};
 use super::shape::{self, Shape, Surface};
 use super::union::{self, Joined};
-use crate::Vec3;
 use crate::fit::leaned;
 use crate::spline::{Crowded, sink_flush, slide_borders};
 
@@ -68,11 +67,11 @@ impl Site<'_> {
         let Some(draw) = options.mould.leans() else {
             return Ok(());
         };
-        let along = (field, &Vec3::from(draw).normalize());
+        let along = (field, &draw);
         let fitted = &shape.fitted;
-        let turned = self.record.stage("fit", || {
-            leaned(&fitted.mesh, fitted, along, &options.fit, self.monitor)
-        })?;
+        let turned = self
+            .record
+            .stage("fit", || leaned(fitted, along, &options.fit, self.monitor))?;
         if let Some(mesh) = turned {
             shape.fitted.mesh = mesh;
         }

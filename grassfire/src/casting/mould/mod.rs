@@ -127,9 +127,10 @@ impl MouldOptions {
         self.repair_draft.unwrap_or(usual)
     }
 
-    /// The draw direction, where the part is repaired along it and gets draft.
-    pub fn leans(&self) -> Option<[f64; 3]> {
-        self.draw.filter(|_| self.added_draft() > 0.0)
+    /// The unit vector of the draw direction, where the part is repaired along it and gets draft.
+    pub fn leans(&self) -> Option<Vec3> {
+        let draw = self.draw.filter(|_| self.added_draft() > 0.0)?;
+        Some(Vec3::from(draw).normalize())
     }
 
     /// The repair that is asked for, with the parting plane at a height along the draw direction and voxels of `cell`, mm.
