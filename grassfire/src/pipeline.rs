@@ -27,7 +27,9 @@ mod repairs;
 mod run;
 mod score;
 mod shape;
+
 mod short_edges;
+mod steady;
 mod tetrahedra;
 mod union;
 mod verify;
@@ -45,6 +47,7 @@ pub use optimize::{OptimizeJob, optimize};
 pub use repairs::Loads;
 pub use run::{RunJob, Stage, run, share_optimization};
 pub use shape::RetryOptions;
+pub use steady::SteadyLimits;
 pub use verify::{VerifyJob, verify_solid};
 
 use crate::cad::{CadOptions, NonDesignOptions, StepOptions};
@@ -338,6 +341,8 @@ fn rebuild(
         grown: None,
         layout,
         regular_refused: None,
+        steady: steady::steady(options).filter(|_| layout == Layout::Auto && drawn.is_none()),
+        steady_refused: None,
     };
     let made = match &fed {
         Some(grown) => site.build_grown(grown)?,

@@ -6,7 +6,7 @@ use super::error::{PipelineError, StageError};
 use super::feeding::{Grown, fed};
 use super::fewest::fewest;
 use super::record::Record;
-use super::shape::{self, Base, Shape};
+use super::shape::{self, Base, Shape, Tried};
 use super::union::{self, Part};
 use super::{ReconstructOptions, measure};
 use crate::fit::{clear_of, raised};
@@ -17,6 +17,8 @@ use crate::remesh::{DesignPart, Remeshed, cut_out};
 use crate::skeleton::{Layout, Skeleton};
 use crate::topology::Betti;
 
+/// A body of steady limits that is within this of the proposal on the whole is taken, voxels (rms, 95 % within twice that).
+const STEADY_CLOSE: f64 = 0.25;
 /// Times that a part is made without the bulges of flat faces that could not be cut.
 const FLAT_ROUNDS: usize = 3;
 
@@ -38,6 +40,10 @@ pub(super) struct Site<'a> {
     pub(super) layout: Layout,
     /// Why it was, if it was.
     pub(super) regular_refused: Option<String>,
+    /// The options with steady limits; none when they are not wanted, or a part of them was given up.
+    pub(super) steady: Option<ReconstructOptions>,
+    /// Why it was, if it was.
+    pub(super) steady_refused: Option<String>,
 }
 
 /// The part with the stages before it.
@@ -87,7 +93,8 @@ impl<'a> Site<'a> {
     /// 2. When that gives no sound body or no valid union with the proposal's topology, or there are no bodies, the
     ///    proposal is made as a whole; the body ends inside the walls of given bodies then. Recognised ones are left out
     ///    when no union with them is valid.
-    /// 3. Either is tried with the regular layout of quads first, once, and with the plain one when that part is refused.
+    /// 3. Either is tried with steady limits of the skeleton first, once, then with the regular layout of quads, once, and with the
+    ///    plain one when those parts are refused.
     /// 4. Where flat faces could not be cut plane, all is made once more without their bulge.
     pub(super) fn build(&mut self) -> Result<Made, PipelineError> {
         for _ in 0..FLAT_ROUNDS {
@@ -173,29 +180,32 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// What `make` gives with the regular layout of quads, or with the plain one when that fails or has a problem.
+    /// What `make` gives with steady limits and the regular layout of quads, else with the regular layout, else with the plain one:
+    /// the first that does not fail and has no problem.
     fn by_layouts<T>(
         &mut self,
         make: impl Fn(&mut Self) -> Result<T, PipelineError>,
         problem: impl Fn(&T) -> Option<String>,
     ) -> Result<T, PipelineError> {
-        let told = self.monitor.warnings().len();
-        let made = make(self);
-        if self.layout != Layout::Auto {
-            return made;
+        loop {
+            let told = self.monitor.warnings().len();
+            let made = make(self);
+            let refused = match &made {
+                Ok(made) => problem(made),
+                Err(error) if error.is_cancelled() => None,
+                Err(error) => Some(format!("{} failed: {}", error.stage, error.source)),
+            };
+            if refused.is_none() || self.layout != Layout::Auto {
+                return made;
+            }
+            self.monitor.keep_warnings(told);
+            if self.steady.take().is_some() {
+                self.steady_refused = refused;
+            } else {
+                self.layout = Layout::Plain;
+                self.regular_refused = refused;
+            }
         }
-        let refused = match &made {
-            Ok(made) => problem(made),
-            Err(error) if error.is_cancelled() => None,
-            Err(error) => Some(format!("{} failed: {}", error.stage, error.source)),
-        };
-        if refused.is_none() {
-            return made;
-        }
-        self.monitor.keep_warnings(told);
-        self.layout = Layout::Plain;
-        self.regular_refused = refused;
-        make(self)
     }
 
     /// The body of a design part united with the bodies.
@@ -330,11 +340,8 @@ impl<'a> Site<'a> {
     /// Medial axis, skeleton and fitted body, each written as it is made.
     fn shape(&mut self, base: &Base) -> Result<(MedialAxis, Shape), PipelineError> {
         let (options, monitor, delivery) = (self.options, self.monitor, self.delivery);
-        let axis = self.record.stage("medial", || {
-            medial::medial_axis(&base.remeshed.field, &options.medial, monitor)
-        })?;
+        let (axis, shape) = self.laid_out(base)?;
         self.record.stage("write", || delivery.medial(&axis.mesh))?;
-        let shape = self.laid_out(&axis, base)?;
         let shape = self.fed(shape, base)?;
         let voxel = base.remeshed.field.spacing;
         let shape = fewest(self.record, shape, voxel, options, monitor)?;
@@ -343,24 +350,71 @@ impl<'a> Site<'a> {
         Ok((axis, shape))
     }
 
-    /// The fitted body; when it is not of the regular layout, that is not tried again.
-    fn laid_out(&mut self, axis: &MedialAxis, base: &Base) -> Result<Shape, PipelineError> {
+    /// Medial axis and fitted body: of steady limits when that is close on the whole, else of the usual ones unless it is farther. What was given
+    /// up is not tried again.
+    fn laid_out(&mut self, base: &Base) -> Result<(MedialAxis, Shape), PipelineError> {
+        let Some(options) = self.steady.clone() else {
+            let (axis, tried) = self.usual(base)?;
+            return Ok((axis, tried?.1));
+        };
+        let (monitor, close) = (self.monitor, options.retry.close);
+        let told = monitor.warnings().len();
+        let axis = self.axis(base, &options)?;
+        let first = shape::first(self.record, &axis, base, &options, monitor);
+        let taken = match &first {
+            Ok((score, _)) => score.close_on_the_whole(STEADY_CLOSE),
+            Err(error) => error.is_cancelled(),
+        };
+        if taken {
+            return Ok((axis, first?.1));
+        }
+        // What went wrong is said once, in the reason.
+        monitor.keep_warnings(told);
+        let (other, second) = self.usual(base)?;
+        if second.as_ref().is_err_and(PipelineError::is_cancelled) {
+            return Ok((other, second?.1));
+        }
+        self.steady_refused = shape::refusal(&first, &second, close);
+        if self.steady_refused.is_some() {
+            self.steady = None;
+            return Ok((other, second?.1));
+        }
+        monitor.keep_warnings(told);
+        (self.layout, self.regular_refused) = (Layout::Auto, None);
+        Ok((axis, first?.1))
+    }
+
+    fn axis(
+        &mut self,
+        base: &Base,
+        options: &ReconstructOptions,
+    ) -> Result<MedialAxis, PipelineError> {
+        let monitor = self.monitor;
+        self.record.stage("medial", || {
+            medial::medial_axis(&base.remeshed.field, &options.medial, monitor)
+        })
+    }
+
+    /// Medial axis and fitted body of the usual limits; when it is not of the regular layout, that is not tried again.
+    fn usual(&mut self, base: &Base) -> Result<(MedialAxis, Tried), PipelineError> {
         let (layout, drawn, options) = (self.layout, self.drawn, self.options);
-        let shape = shape::shape(
+        let axis = self.axis(base, options)?;
+        let tried = shape::shape(
             self.record,
-            axis,
+            &axis,
             base,
             drawn,
             layout,
             options,
             self.monitor,
         );
-        let regular = shape.as_ref().is_ok_and(|s| s.layout == Layout::Regular);
+        let shape = tried.as_ref().ok().map(|(_, shape)| shape);
+        let regular = shape.is_some_and(|shape| shape.layout == Layout::Regular);
         if layout == Layout::Auto && !regular {
             self.layout = Layout::Plain;
-            self.regular_refused = shape.as_ref().ok().and_then(|s| s.regular_refused.clone());
+            self.regular_refused = shape.and_then(|shape| shape.regular_refused.clone());
         }
-        shape
+        Ok((axis, tried))
     }
 
     /// The shape with sections that grow towards the feeders, as far as its body can follow.
@@ -410,12 +464,15 @@ impl<'a> Site<'a> {
     fn report(&mut self, axis: &MedialAxis, shape: &Shape, united: Option<Betti>) {
         let report = &mut self.record.report;
         report.topology = Some(measure::topology_block(axis, shape, united));
-        let refused = self.regular_refused.clone();
         let layout = match self.drawn {
             Some(_) => "drawn",
             None => shape.layout.name(),
         };
-        report.skeleton = Some(measure::skeleton_block(axis, shape, layout, refused));
+        let mut block = measure::skeleton_block(axis, shape, layout);
+        block.regular_refused.clone_from(&self.regular_refused);
+        block.steady = self.steady.is_some();
+        block.steady_refused.clone_from(&self.steady_refused);
+        report.skeleton = Some(block);
         report.body = Some(measure::body_block(shape));
     }
 }

@@ -51,17 +51,11 @@ pub(super) fn topology_block(
     }
 }
 
-pub(super) fn skeleton_block(
-    axis: &MedialAxis,
-    shape: &Shape,
-    layout: &str,
-    regular_refused: Option<String>,
-) -> SkeletonBlock {
+pub(super) fn skeleton_block(axis: &MedialAxis, shape: &Shape, layout: &str) -> SkeletonBlock {
     let stats = &shape.skeleton.stats;
     let corners = &stats.corner_deviation;
     SkeletonBlock {
         layout: layout.to_owned(),
-        regular_refused,
         quads: stats.quads,
         beams: stats.beams,
         sheets: stats.sheets,
@@ -79,6 +73,7 @@ pub(super) fn skeleton_block(
             median: stats.radius.median,
             max: stats.radius.max,
         },
+        ..SkeletonBlock::default()
     }
 }
 

@@ -7,6 +7,7 @@ use super::ReconstructOptions;
 use super::error::{PipelineError, StageError};
 use super::record::Record;
 use super::score::{Best, FINE, MANY, Score, next_size};
+use super::steady::SteadyLimits;
 use crate::fit::{FitOptions, Fitted, fit, volume};
 use crate::medial::MedialAxis;
 use crate::monitor::Monitor;
@@ -35,6 +36,9 @@ pub struct RetryOptions {
     /// A body is close enough when it is within this distance of the proposal (rms, 95 % within twice that), voxels; else finer
     /// quads are tried, and the closest body is kept.
     pub close: f64,
+    /// Limits of the skeleton for the first try, with the regular layout; it is given up like that one, and the limits in `medial` and
+    /// `skeleton` are used. None leaves it out, and so do other than the default limits there.
+    pub steady: Option<SteadyLimits>,
 }
 
 impl Default for RetryOptions {
@@ -42,6 +46,7 @@ impl Default for RetryOptions {
         Self {
             quad_sizes: vec![1.0, 0.8, 1.3, 0.65],
             close: 0.22,
+            steady: Some(SteadyLimits::default()),
         }
     }
 }
@@ -90,6 +95,9 @@ impl Base<'_> {
     }
 }
 
+/// A shape with its score, or why there is none.
+pub(super) type Tried = Result<(Score, Shape), PipelineError>;
+
 /// What every try starts from.
 struct Workshop<'a> {
     record: &'a mut Record,
@@ -114,7 +122,7 @@ pub(super) fn shape(
     layout: Layout,
     options: &ReconstructOptions,
     monitor: &Monitor,
-) -> Result<Shape, PipelineError> {
+) -> Tried {
     let mut workshop = Workshop {
         record,
         axis,
@@ -130,7 +138,7 @@ pub(super) fn shape(
         Err(error) => error.is_cancelled() || options.retry.quad_sizes.is_empty(),
     };
     if finished || drawn.is_some() || base.united.is_some() {
-        return tried.map(|(_, shape)| shape);
+        return tried;
     }
     let first = tried.as_ref().ok().map(|(_, shape)| shape);
     let refused = first.and_then(|shape| shape.regular_refused.clone());
@@ -142,18 +150,49 @@ pub(super) fn shape(
             if !score.good() {
                 monitor.warn("fit", format!("wrapped body: {score}"));
             }
-            return Ok(Shape {
+            let shape = Shape {
                 regular_refused: refused,
                 ..shape
-            });
+            };
+            return Ok((score, shape));
         }
     }
-    tried.map(|(_, shape)| shape)
+    tried
+}
+
+/// The regular layout on a skeleton of the steady limits in `options`, whose medial axis `axis` is.
+pub(super) fn first(
+    record: &mut Record,
+    axis: &MedialAxis,
+    base: &Base,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Tried {
+    let size = options.retry.quad_sizes.first().copied().unwrap_or(1.0);
+    let mut workshop = Workshop {
+        record,
+        axis,
+        base,
+        drawn: None,
+        layout: Layout::Regular,
+        options,
+        monitor,
+    };
+    workshop.regular(size)
+}
+
+/// Why the first of two shapes is not taken instead of the second.
+pub(super) fn refusal(first: &Tried, second: &Tried, close: f64) -> Option<String> {
+    match (first, second) {
+        (Err(error), _) => Some(error.source.to_string()),
+        (Ok((first, _)), Ok((second, other))) if !other.wrapped => first.refused_for(second, close),
+        (Ok((first, _)), _) => (!first.good()).then(|| first.to_string()),
+    }
 }
 
 impl Workshop<'_> {
     /// The shape of the regular layout when that is good enough, else of the plain one.
-    fn layouts(&mut self) -> Result<(Score, Shape), PipelineError> {
+    fn layouts(&mut self) -> Tried {
         let first = self.options.retry.quad_sizes.first();
         let Some(&size) = first.filter(|_| self.layout == Layout::Auto && self.drawn.is_none())
         else {
@@ -171,12 +210,10 @@ impl Workshop<'_> {
         // What went wrong is said once, in the reason.
         self.monitor.keep_warnings(told);
         let plain = self.tries();
-        let refused = match (&regular, &plain) {
-            (_, Err(error)) if error.is_cancelled() => return plain,
-            (Err(error), _) => Some(error.source.to_string()),
-            (Ok((regular, _)), Ok((plain, _))) => regular.refused_for(plain, close),
-            (Ok((regular, _)), Err(_)) => (!regular.good()).then(|| regular.to_string()),
-        };
+        if plain.as_ref().is_err_and(PipelineError::is_cancelled) {
+            return plain;
+        }
+        let refused = refusal(&regular, &plain, close);
         if refused.is_none() {
             self.monitor.keep_warnings(told);
             return regular;
@@ -191,7 +228,7 @@ impl Workshop<'_> {
     }
 
     /// The regular layout at one quad size, or at the next finer one when that is good but rough, and that one less so.
-    fn regular(&mut self, size: f64) -> Result<(Score, Shape), PipelineError> {
+    fn regular(&mut self, size: f64) -> Tried {
         let (skeleton, body) = self.thickened(size)?;
         let quads = body.mesh.quads.len();
         if quads > MOST_QUADS {
@@ -224,7 +261,7 @@ impl Workshop<'_> {
     }
 
     /// The first good shape of all quad sizes, else the best.
-    fn tries(&mut self) -> Result<(Score, Shape), PipelineError> {
+    fn tries(&mut self) -> Tried {
         let sizes: &[f64] = if self.drawn.is_some() {
             &[1.0]
         } else {
@@ -278,7 +315,7 @@ impl Workshop<'_> {
         best
     }
 
-    fn one(&mut self, size: f64) -> Result<(Score, Shape), PipelineError> {
+    fn one(&mut self, size: f64) -> Tried {
         let (skeleton, body) = self.thickened(size)?;
         self.fitted(skeleton, body, false)
     }
@@ -330,12 +367,7 @@ impl Workshop<'_> {
         Ok(best)
     }
 
-    fn fitted(
-        &mut self,
-        skeleton: QuadSkeleton,
-        body: ThickenedBody,
-        wrapped: bool,
-    ) -> Result<(Score, Shape), PipelineError> {
+    fn fitted(&mut self, skeleton: QuadSkeleton, body: ThickenedBody, wrapped: bool) -> Tried {
         let (base, field) = (self.base, self.base.target);
         let options = &self.options.fit;
         let fitted = self.record.stage("fit", || {

@@ -13,8 +13,8 @@ use crate::monitor::Monitor;
 use crate::topology::Betti;
 use crate::voxel::VoxelGrid;
 
-/// Options of [`cut_out`], all lengths in voxels of the grid that the proposal came from or, where that is unknown or
-/// finer, of the remesh.
+/// Options of [`cut_out`], all lengths in voxels of the remesh or, where they are larger, of the grid that the proposal came from and
+/// those that it has by default: a finer voxel gives the same design part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CutOutOptions {
@@ -88,7 +88,7 @@ struct Lengths {
 impl Lengths {
     fn new(options: &CutOutOptions, proposal: &Remeshed) -> Self {
         let voxel = proposal.field.spacing;
-        let unit = voxel.max(proposal.source.unwrap_or(0.0));
+        let unit = proposal.grain;
         let skin = options.skin * unit;
         let least_half_thickness = options.least_half_thickness * unit;
         Self {
@@ -478,6 +478,7 @@ fn solid_of(
         changes: cleaned.changes,
         distance_max: proposal.distance_max,
         source: proposal.source,
+        grain: proposal.grain,
     }))
 }
 

@@ -38,6 +38,7 @@ fn proposal(burr: f64, height: f64) -> Remeshed {
         changes: Vec::new(),
         distance_max: 0.0,
         source: None,
+        grain: 0.8,
     }
 }
 
@@ -115,6 +116,20 @@ fn walls_that_stand_out_leave_no_shells() {
     assert_eq!(design.united, design.wanted);
     let highest = design.part.solid.mesh().points.iter().map(|p| p.y.abs());
     assert!(highest.fold(0.0, f64::max) < 4.0);
+}
+
+#[test]
+fn slices_beside_bodies_stayed_at_a_finer_voxel_than_the_default() {
+    let mut proposal = proposal(1.6, 2.0);
+    let highest = |proposal: &Remeshed| {
+        let design = cut(proposal);
+        let points = design.part.solid.mesh().points.iter();
+        points.map(|p| p.y.abs()).fold(0.0, f64::max)
+    };
+    // They are 1.2 mm thick: more than one voxel of 0.8 mm, but less than a default one of 1.1 mm resolves.
+    assert!(highest(&proposal) > 8.0);
+    proposal.grain = 1.1;
+    assert!(highest(&proposal) < 4.0);
 }
 
 #[test]

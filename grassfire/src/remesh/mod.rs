@@ -89,6 +89,8 @@ pub struct Remeshed {
     pub distance_max: f64,
     /// Spacing of the grid that the input came from, mm, where that can be seen.
     pub source: Option<f64>,
+    /// Smallest detail that means something, mm: the largest of the voxel, `source` and, where a voxel was asked for, the default one.
+    pub grain: f64,
 }
 
 /// Remeshes a triangle soup with good orientation (repaired, but holes, duplicates, overlaps and cracks are allowed).
@@ -232,6 +234,10 @@ fn remesh_on(
         wanted,
     } = sample::sampled(mesh, trusted, options, monitor)?;
     let voxel = field.spacing;
+    let natural = || resolution::voxel_for(mesh, &bvh, options);
+    let grain = voxel
+        .max(source.unwrap_or(0.0))
+        .max(options.voxel.map_or(0.0, |_| natural()));
     let width = options.min_tunnel * source.unwrap_or(voxel);
     let input_genus = shells.as_deref().map(input::genus);
     let (vanished, narrow) = vanished(mesh, &field, input_genus, monitor);
@@ -269,6 +275,7 @@ fn remesh_on(
         changes: noise.changes,
         distance_max,
         source,
+        grain,
     })
 }
 

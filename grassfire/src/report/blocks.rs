@@ -217,6 +217,11 @@ pub struct SkeletonBlock {
     /// Why the regular layout was given up for the plain one; none when it was not tried.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub regular_refused: Option<String>,
+    /// Made with the steady limits, `retry.steady`.
+    pub steady: bool,
+    /// Why these were given up for the usual ones; none when they were not tried.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steady_refused: Option<String>,
     /// Quads.
     pub quads: usize,
     /// Edges without quads.

@@ -307,8 +307,12 @@ fn skeleton(block: &SkeletonBlock) -> Markup {
         @if let Some(why) = &block.regular_refused {
             p { "The regular layout of its quads was given up: " (why) "." }
         }
+        @if let Some(why) = &block.steady_refused {
+            p { "The steady limits of sheets and members were given up: " (why) "." }
+        }
         (pairs(&[
             ("Layout", block.layout.clone()),
+            ("Limits", if block.steady { "steady" } else { "usual" }.to_owned()),
             ("Quads", count(block.quads)),
             ("Beams", count(block.beams)),
             ("Sheets", count(block.sheets)),

@@ -11,6 +11,7 @@ use super::complex::{Class, Complex};
 use super::edges::edge;
 use super::layout::Layout;
 use super::members::burn_members;
+use super::nodes::merge_nodes;
 use super::pairing::{make_even, pair, split_all, split_rims};
 use super::polygons::Polygon;
 use super::quad_mesh::QuadMesh;
@@ -62,6 +63,9 @@ pub struct SkeletonOptions {
     /// So do those, once narrow sheets are beams, that have little material and stick out by less than this many radii: what tapers
     /// off beside a non-design body. 0 keeps them.
     pub slight_spur: f64,
+    /// Beams between nodes that are shorter than this multiple of the nodes' mean radius are contracted: such nodes are one. 0
+    /// keeps them.
+    pub node_distance: f64,
     /// Smoothing rounds along rims, seams and beams.
     pub smoothing: usize,
     /// Searches for quads with few irregular vertices; the best one counts, 0 leaves the quads as matched.
@@ -83,6 +87,7 @@ impl Default for SkeletonOptions {
             member_size: 4.0,
             spur: 0.6,
             slight_spur: 0.0,
+            node_distance: 0.0,
             smoothing: 80,
             searches: 4,
             seed: 1,
@@ -120,6 +125,7 @@ impl SkeletonOptions {
         not_negative("skeleton.member_size", self.member_size)?;
         not_negative("skeleton.spur", self.spur)?;
         not_negative("skeleton.slight_spur", self.slight_spur)?;
+        not_negative("skeleton.node_distance", self.node_distance)?;
         inside(
             self.searches <= 1000,
             "skeleton.searches",
@@ -205,6 +211,7 @@ pub fn quad_skeleton(
     let reference = Reference::new(&c, &traced, 0.2 * unit, own_arcs);
     let sizing = sizing(options, median, spacing);
     coarsen(&mut c, &reference, &sizing, unit, monitor)?;
+    merge_nodes(&mut c, options.node_distance);
     bend_beams(&mut c, &reference, unit);
     lengthen_balls(&mut c);
     verify("coarsening", c.betti())?;

@@ -13,6 +13,7 @@ mod error;
 mod layout;
 mod members;
 mod nearest;
+mod nodes;
 mod pairing;
 mod polygons;
 mod quad_mesh;
