@@ -1,4 +1,5 @@
-//! Upright walls of a body that leaves a mould lean inwards away from the parting: no wave of a fit overhangs.
+//! Upright walls of a body that leaves a mould lean inwards away from the parting, and pass what would shade them: neither a wave of
+//! a fit nor the edge of a non-design body overhangs.
 
 use std::collections::BTreeMap;
 
@@ -58,10 +59,12 @@ struct Piece {
 /// The control mesh of a fitted body with upright walls that do not overhang along the unit vector `draw`; none where none does.
 ///
 /// 1. Pieces of upright walls (16 a quad) know from the proposal on which side of the parting they lie: along the draw direction its
-///    field falls away from the parting. Pieces that overhang in the proposal, too, are left alone.
+///    field falls away from the parting. Pieces that overhang in the proposal, too, or lie hidden in `bosses` are left alone.
 /// 2. Rounds turn the pieces that lean inwards by less than half a degree (linearised, with a weight that grows), by the least
-///    move of control points at the same volume, bent as little as possible. Steps are shortened where they would create an intersection or a fold.
-/// 3. The round with the least overhang is kept.
+///    move of control points at the same volume, bent as little as possible. At the same time the body's side moves out past
+///    every gap between material along the draw direction (lines a quarter of a voxel apart, through body and `bosses`)
+///    which the proposal does not have. Steps are shortened where they would create an intersection or a fold.
+/// 3. The round that leaves the least overhang and gaps is kept.
 ///
 /// `field` is the signed distance to the proposal, mm, positive inside.
 ///
