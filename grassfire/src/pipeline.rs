@@ -19,6 +19,8 @@ mod follow;
 mod illustrate;
 mod inputs;
 mod measure;
+#[cfg(feature = "occt")]
+mod notches;
 mod optimize;
 mod proposal;
 mod recognise;
@@ -304,6 +306,12 @@ fn rebuild(
     // Undercuts last: whatever the edits did, none are left.
     let from = edited.as_ref().unwrap_or(&remeshed);
     let repaired = casting::drawn_out(record, from, &bodies, options, monitor)?;
+    #[cfg(feature = "occt")]
+    if let Some(repaired) = &repaired {
+        record.stage("mould", || {
+            notches::close(&mut bodies, &repaired.field, options, monitor)
+        })?;
+    }
     let (shown, original) = match (edited, repaired) {
         (None, repaired) => (None, repaired.unwrap_or(remeshed)),
         (Some(edited), repaired) => (Some(remeshed), repaired.unwrap_or(edited)),

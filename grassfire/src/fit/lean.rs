@@ -1,4 +1,5 @@
-//! Upright walls of a body that leaves a mould lean inwards away from the parting: no wave of a fit overhangs.
+//! Upright walls of a body that leaves a mould lean inwards away from the parting, and pass what would shade them: neither a wave of
+//! a fit nor the edge of a non-design body overhangs.
 
 use std::collections::BTreeMap;
 
@@ -7,12 +8,15 @@ use rayon::prelude::*;
 
 use super::guard::guarded_step;
 use super::round::Solver;
+use super::shade::Shade;
 use super::surface::Surface;
 use super::tangles::Tangles;
 use super::targets::{IsoSamples, flow_to_surface};
 use super::{FitError, FitOptions, Fitted, STAGE};
 use crate::Vec3;
+use crate::mesh::Winding;
 use crate::monitor::Monitor;
+use crate::remesh::Bosses;
 use crate::spline::ControlMesh;
 use crate::voxel::VoxelGrid;
 
@@ -32,7 +36,9 @@ const AGREE: f64 = 0.5;
 const REACH: f64 = 3.0;
 /// A wall that leans wrongly by an angle weighs as much as control points that move by this many voxels times the angle, at first.
 const WEIGHT: f64 = 20.0;
-/// Growth of that in every round.
+/// Weight of a place beside a gap, a voxel away from where it must be, at first.
+const PUSH: f64 = 4.0;
+/// Growth of both in a round.
 const GROWTH: f64 = 1.5;
 /// Weight of bending what is added, against moving it.
 const FAIRNESS: f64 = 1.0;
@@ -53,10 +59,12 @@ struct Piece {
 /// The control mesh of a fitted body with upright walls that do not overhang along the unit vector `draw`; none where none does.
 ///
 /// 1. Pieces of upright walls (16 a quad) know from the proposal on which side of the parting they lie: along the draw direction its
-///    field falls away from the parting. Pieces that overhang in the proposal, too, are left alone.
+///    field falls away from the parting. Pieces that overhang in the proposal, too, or lie hidden in `bosses` are left alone.
 /// 2. Rounds turn the pieces that lean inwards by less than half a degree (linearised, with a weight that grows), by the least
-///    move of control points at the same volume, bent as little as possible. Steps are shortened where they would create an intersection or a fold.
-/// 3. The round with the least overhang is kept.
+///    move of control points at the same volume, bent as little as possible. At the same time the body's side moves out past
+///    every gap between material along the draw direction (lines a quarter of a voxel apart, through body and `bosses`)
+///    which the proposal does not have. Steps are shortened where they would create an intersection or a fold.
+/// 3. The round that leaves the least overhang and gaps is kept.
 ///
 /// `field` is the signed distance to the proposal, mm, positive inside.
 ///
@@ -64,7 +72,7 @@ struct Piece {
 /// A mesh that cannot be subdivided, a system that cannot be factorised; cancelled.
 pub fn leaned(
     fitted: &Fitted,
-    (field, draw): (&VoxelGrid<f32>, &Vec3),
+    (field, draw, bosses): (&VoxelGrid<f32>, &Vec3, &Bosses),
     options: &FitOptions,
     monitor: &Monitor,
 ) -> Result<Option<ControlMesh>, FitError> {
@@ -77,55 +85,62 @@ pub fn leaned(
         .map(|p| field.to_grid(p))
         .collect();
     solver.volume = Some(solver.surface.volume(&start));
-    let mut least = solver.overhang(&start, draw);
+    let mut shade = Shade::new(field, draw, bosses);
+    let mut least = solver.left(&start, &shade);
     let mut found = Tangles::of(&solver, &start);
     let (mut here, mut best) = (start.clone(), None);
-    let (mut weight, mut idle) = (WEIGHT, 0);
+    let (mut weights, mut idle) = ([WEIGHT, PUSH], 0);
     for round in 0..ROUNDS {
-        if least <= 0.0 || idle == PATIENCE {
+        if least.iter().sum::<f64>() <= 0.0 || idle == PATIENCE {
             break;
         }
         let part = f64::from(round) / f64::from(ROUNDS);
         monitor.step(STAGE, "upright walls", part)?;
         let wanted = solver
-            .turned(&start, &here, draw, weight)
+            .turned(&start, &here, &mut shade, weights)
             .map_err(|reason| FitError::Solver { round, reason })?;
         let Some(step) = guarded_step(&mut solver, &here, &wanted, &found) else {
             break;
         };
         (here, found) = step;
-        let now = solver.overhang(&here, draw);
+        let now = solver.left(&here, &shade);
         idle += 1;
-        if now < least {
+        if now[0] < least[0] {
+            weights[0] *= GROWTH;
+        }
+        weights[1] *= GROWTH;
+        if now.iter().sum::<f64>() < least.iter().sum() {
             (least, idle) = (now, 0);
             best = Some(here.clone());
         }
-        weight *= GROWTH;
     }
     Ok(best.map(|points| solver.surface.control_mesh(&points)))
 }
 
 impl Solver<'_> {
-    /// Volume-like measure of what overhangs: area times lean, squared voxels.
-    fn overhang(&self, points: &[Vec3], draw: &Vec3) -> f64 {
+    /// What is left, squared voxels: area times lean of what overhangs, and the area of gaps as seen along the draw direction.
+    fn left(&self, points: &[Vec3], shade: &Shade) -> [f64; 2] {
         let at = self.surface.samples.apply(points);
-        let pieces = self.upright(&at, draw);
-        pieces.iter().map(|p| p.area * (-p.lean).max(0.0)).sum()
+        let pieces = self.upright(&at, shade);
+        let overhang = pieces.iter().map(|p| p.area * (-p.lean).max(0.0)).sum();
+        [overhang, shade.area(&self.surface.triangle_mesh(at))]
     }
 
     /// The pieces of upright walls.
-    fn upright(&self, at: &[Vec3], draw: &Vec3) -> Vec<Piece> {
-        let quads = &self.surface.fine.quads;
+    fn upright(&self, at: &[Vec3], shade: &Shade) -> Vec<Piece> {
+        let (quads, draw) = (&self.surface.fine.quads, shade.draw());
+        let hidden = Winding::new(&shade.walls);
         let piece = |quad: usize| {
             let [a, b, c, d] = quads[quad].map(|v| at[v as usize]);
             let across = (c - a).cross(&(d - b)) / 2.0;
             let area = across.norm();
             let normal = across.try_normalize(1e-12)?;
-            let (place, outward) = flow_to_surface(self.field, &((a + b + c + d) / 4.0), 6);
+            let middle = (a + b + c + d) / 4.0;
+            let (place, outward) = flow_to_surface(self.field, &middle, 6);
             let side = self.side(&place, draw)?;
             let (steep, lean) = (side * outward.dot(draw), side * normal.dot(draw));
             let wall = steep < UPRIGHT && steep > OVERHANG && outward.dot(&normal) > AGREE;
-            wall.then_some(Piece {
+            (wall && hidden.at(&middle) < 0.5).then_some(Piece {
                 quad,
                 side,
                 lean,
@@ -155,10 +170,11 @@ impl Solver<'_> {
         &mut self,
         start: &[Vec3],
         here: &[Vec3],
-        draw: &Vec3,
-        weight: f64,
+        shade: &mut Shade,
+        [turning, pushing]: [f64; 2],
     ) -> Result<Vec<Vec3>, String> {
         let at = self.surface.samples.apply(here);
+        shade.look(&self.surface.triangle_mesh(at.clone()));
         let (normals, areas) = self.surface.normals_and_areas(&at);
         let mean_area = areas.iter().sum::<f64>() / here.len().max(1) as f64;
         self.equations.clear();
@@ -170,11 +186,12 @@ impl Solver<'_> {
             self.equations
                 .add(indices, weights, &block, &(block * bent));
         }
-        for piece in self.upright(&at, draw) {
+        for piece in self.upright(&at, shade) {
             if piece.lean < LEAN {
-                self.add_turn(&piece, here, &at, (draw, weight));
+                self.add_turn(&piece, here, &at, (shade.draw(), turning));
             }
         }
+        self.add_pushes(&shade.pushes, pushing);
         let mut points = self.solution(&normals, &areas)?;
         for (p, from) in points.iter_mut().zip(start) {
             let way = *p - from;
@@ -282,7 +299,8 @@ mod tests {
             ..Fitted::default()
         };
         let (options, monitor) = (FitOptions::default(), Monitor::default());
-        let along = (&field, &Vec3::z());
+        let (z, bosses) = (Vec3::z(), Bosses::default());
+        let along = (&field, &z, &bosses);
         let turned = leaned(&fitted(&mesh), along, &options, &monitor).expect("it can be solved");
         let turned = turned.expect("walls overhang");
         let (before, after) = (overhanging(&mesh), overhanging(&turned));

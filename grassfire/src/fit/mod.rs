@@ -12,6 +12,7 @@ mod refine;
 mod residual;
 mod round;
 mod settle;
+mod shade;
 mod strips;
 mod surface;
 mod tangles;

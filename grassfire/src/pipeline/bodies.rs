@@ -11,6 +11,8 @@ use crate::cad::{self, NonDesignBody};
 use crate::io::{self, Input};
 use crate::mesh::{Bvh, TriMesh};
 use crate::monitor::Monitor;
+#[cfg(feature = "occt")]
+use crate::non_design::Boss;
 use crate::non_design::Flats;
 use crate::remesh::{Bosses, Capsule};
 use crate::report::FlatBlock;
@@ -33,6 +35,9 @@ pub(super) struct Bodies {
     pub(super) surface: TriMesh,
     /// The same with their bores filled, as cutting and fitting see them.
     pub(super) bosses: Bosses,
+    /// What was recognised of the solids that are sleeves, with their numbers.
+    #[cfg(feature = "occt")]
+    pub(super) sleeves: Vec<(usize, Boss)>,
     /// Flat faces of the proposal that become exactly plane.
     pub(super) flats: Flats,
     /// Nobody gave them: the part may be made without them.
@@ -57,6 +62,13 @@ impl Bodies {
         let first = self.solids.len();
         self.solids.extend(solids);
         self.measure(first)
+    }
+
+    /// Surfaces and bores of all bodies anew.
+    pub(super) fn measure_again(&mut self) -> Result<(), StageError> {
+        self.surface = TriMesh::default();
+        self.bosses = Bosses::default();
+        self.measure(0)
     }
 
     /// Surfaces and bores of the bodies from number `first` on.

@@ -10,9 +10,7 @@ use super::{Outcome, ReconstructOptions, inputs};
 use crate::Vec3;
 #[cfg(feature = "occt")]
 use crate::cad;
-use crate::casting::mould::{
-    self, Mould, MouldOptions, Repair, RepairOptions, dexels, mould, parting,
-};
+use crate::casting::mould::{self, Mould, MouldOptions, Repair, dexels, mould, parting, remaining};
 use crate::casting::solidify::{Cell, HotSpot, Solidification, solidify};
 use crate::io::{self, Input};
 use crate::mesh::{TriMesh, repair};
@@ -206,34 +204,6 @@ fn repaired(
     Ok((repaired, solid))
 }
 
-/// Lines of a finished part with more than one interval, and its undercut, mm3, both without what cores make; none where a core
-/// has no undercut any more.
-///
-/// # Errors
-/// Cancelled.
-pub(super) fn left(
-    part: &TriMesh,
-    draw: &Vec3,
-    repaired_as: &RepairOptions,
-    monitor: &Monitor,
-) -> Result<(Option<usize>, Option<f64>), StageError> {
-    let asked = RepairOptions {
-        kind: Repair::Fill,
-        draft: 0.0,
-        min_gap: 0.0,
-        removals: Vec::new(),
-        ..repaired_as.clone()
-    };
-    match mould::repair(part, draw, &asked, monitor) {
-        Ok(filled) => Ok((
-            Some(filled.multiple[0]),
-            Some(filled.volume[1] - filled.volume[0]),
-        )),
-        Err(mould::MouldError::Cancelled(cancelled)) => Err(cancelled.into()),
-        Err(_) => Ok((None, None)),
-    }
-}
-
 /// Looks at the mould of a finished part when a draw direction is given; what was repaired before on voxels of `cell` mm stays in
 /// the report, beside what is left of it.
 pub(super) fn mould_of(
@@ -251,9 +221,10 @@ pub(super) fn mould_of(
         let mut asked = options.repair_options(0.0, cell);
         asked.bores.clone_from(&bodies.bosses.free);
         let draw = Vec3::from(draw).normalize();
-        finished = record
-            .stage("mould", || left(part, &draw, &asked, monitor))?
-            .0;
+        finished = Some(record.stage("mould", || {
+            monitor.check()?;
+            Ok::<_, StageError>(remaining(part, &draw, &asked).0)
+        })?);
     }
     let options = MouldOptions {
         repair: Repair::Off,

@@ -13,7 +13,10 @@ use crate::non_design::{self, Boss, Candidate, Flats, RecogniseMode, Recognised}
 use crate::remesh::default_voxel;
 use crate::report::{CandidateBlock, DesignFaceBlock};
 
-const STAGE: &str = "recognise";
+pub(super) const STAGE: &str = "recognise";
+/// Where recognised bodies come from.
+#[cfg(feature = "occt")]
+pub(super) const SOURCE: &str = "recognised in the proposal";
 /// A hollow that turns by more than this is worth a word why it is no boss, radians.
 const HALF_TURN: f64 = std::f64::consts::PI;
 
@@ -120,9 +123,9 @@ fn add(
     let mut united = Vec::new();
     for boss in bosses {
         let name = format!("boss {}", bodies.solids.len() + 1);
-        let source = "recognised in the proposal";
-        match cad::from_boss(&name, source, boss, &options.non_design, monitor) {
+        match cad::from_boss(&name, SOURCE, boss, &options.non_design, monitor) {
             Ok(body) => {
+                bodies.sleeves.push((bodies.solids.len(), boss.clone()));
                 bodies.add(vec![body])?;
                 united.push(boss.bore);
             }

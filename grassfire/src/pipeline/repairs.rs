@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use super::casting::left;
 use super::edits::skeleton_of;
 use super::error::{PipelineError, StageError};
 use super::record::Record;
@@ -11,7 +10,7 @@ use crate::Vec3;
 use crate::case::Case;
 use crate::casting::mould::{
     self, Conflict, Repair, RepairOptions, Room, best_direction, choose, conflicts, dexels,
-    parting, rooms,
+    parting, remaining, rooms,
 };
 use crate::edit::Edit;
 use crate::mesh::TriMesh;
@@ -222,7 +221,8 @@ impl<'a> Search<'a> {
             Err(error) => row.error = Some(format!("{}: {}", error.stage, error.source)),
             Ok((report, mesh)) => {
                 fill_row(&mut row, &report);
-                (row.lines, row.undercut) = self.left(ways, &mesh, monitor)?;
+                let (lines, undercut) = self.left(ways, &mesh);
+                (row.lines, row.undercut) = (Some(lines), Some(undercut));
             }
         }
         row.name = name;
@@ -265,21 +265,12 @@ impl<'a> Search<'a> {
         Ok((outcome.report, made.mesh))
     }
 
-    /// Lines of a finished part with more than one interval, and its undercut, mm3, both without the cores; none where a core has
-    /// no undercut any more.
-    fn left(
-        &self,
-        ways: &[usize],
-        mesh: &TriMesh,
-        monitor: &Monitor,
-    ) -> Result<(Option<usize>, Option<f64>), PipelineError> {
+    /// Lines of a finished part with more than one interval, and its undercut, mm3, both without the cores.
+    fn left(&self, ways: &[usize], mesh: &TriMesh) -> (usize, f64) {
         let cores = self.picked(ways).filter(|w| *w.1 == Way::Core);
         let mut asked = self.base.clone();
         asked.cores.extend(cores.map(|(room, _)| room.place));
-        left(mesh, &self.draw, &asked, monitor).map_err(|source| PipelineError {
-            stage: STAGE,
-            source,
-        })
+        remaining(mesh, &self.draw, &asked)
     }
 
     fn block(self) -> RepairsBlock {

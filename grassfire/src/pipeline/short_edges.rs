@@ -67,7 +67,7 @@ impl Site<'_> {
         let Some(draw) = options.mould.leans() else {
             return Ok(());
         };
-        let along = (field, &draw);
+        let along = (field, &draw, &self.bodies.bosses);
         let fitted = &shape.fitted;
         let turned = self
             .record
