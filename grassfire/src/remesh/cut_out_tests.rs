@@ -126,9 +126,9 @@ fn slices_beside_bodies_stayed_at_a_finer_voxel_than_the_default() {
         let points = design.part.solid.mesh().points.iter();
         points.map(|p| p.y.abs()).fold(0.0, f64::max)
     };
-    // They are 1.2 mm thick: more than one voxel of 0.8 mm, but less than a default one of 1.1 mm resolves.
+    // They are 1.2 mm thick: more than one voxel of 0.8 mm, but less than a default one of 1.6 mm.
     assert!(highest(&proposal) > 8.0);
-    proposal.grain = 1.1;
+    proposal.grain = 1.6;
     assert!(highest(&proposal) < 4.0);
 }
 

@@ -234,7 +234,7 @@ fn remesh_on(
         wanted,
     } = sample::sampled(mesh, trusted, options, monitor)?;
     let voxel = field.spacing;
-    let natural = || resolution::voxel_for(mesh, &bvh, options);
+    let natural = || default_voxel(mesh, options);
     let grain = voxel
         .max(source.unwrap_or(0.0))
         .max(options.voxel.map_or(0.0, |_| natural()));
