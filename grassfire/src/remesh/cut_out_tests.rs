@@ -129,7 +129,8 @@ fn slices_beside_bodies_stayed_at_a_finer_voxel_than_the_default() {
     // They are 1.2 mm thick: more than one voxel of 0.8 mm, but less than a default one of 1.6 mm.
     assert!(highest(&proposal) > 8.0);
     proposal.grain = 1.6;
-    assert!(highest(&proposal) < 4.0);
+    // What is left runs on into the walls, which end at 8 mm.
+    assert!(highest(&proposal) < 8.0);
 }
 
 #[test]
