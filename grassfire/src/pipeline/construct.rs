@@ -362,7 +362,7 @@ impl<'a> Site<'a> {
         let axis = self.axis(base, &options)?;
         let first = shape::first(self.record, &axis, base, &options, monitor);
         let taken = match &first {
-            Ok((score, _)) => score.close_on_the_whole(STEADY_CLOSE),
+            Ok((score, shape)) => score.close_on_the_whole(STEADY_CLOSE) && shape.has_sheets(),
             Err(error) => error.is_cancelled(),
         };
         if taken {
@@ -374,7 +374,13 @@ impl<'a> Site<'a> {
         if second.as_ref().is_err_and(PipelineError::is_cancelled) {
             return Ok((other, second?.1));
         }
-        self.steady_refused = shape::refusal(&first, &second, close);
+        let sheets = |tried: &Tried| tried.as_ref().is_ok_and(|(_, shape)| shape.has_sheets());
+        self.steady_refused = if sheets(&second) && !sheets(&first) {
+            // A plate whose holes leave narrow strips would be a frame of beams.
+            Some("no sheet of the part is left".to_owned())
+        } else {
+            shape::refusal(&first, &second, close)
+        };
         if self.steady_refused.is_some() {
             self.steady = None;
             return Ok((other, second?.1));

@@ -411,6 +411,11 @@ impl Workshop<'_> {
 }
 
 impl Shape {
+    /// The skeleton is not of beams alone.
+    pub(super) fn has_sheets(&self) -> bool {
+        self.skeleton.stats.sheets > 0
+    }
+
     /// The body neither cuts itself nor folds over.
     pub(super) fn sound(&self) -> bool {
         self.fitted.self_intersections.is_empty() && flipped(&self.fitted) == 0
