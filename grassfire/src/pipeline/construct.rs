@@ -350,7 +350,7 @@ impl<'a> Site<'a> {
         Ok((axis, shape))
     }
 
-    /// Medial axis and fitted body: of steady limits when that is close on the whole, else of the usual ones unless it is farther. What was given
+    /// Medial axis and fitted body: of steady limits when that is close, else of the usual ones unless it is farther. What was given
     /// up is not tried again.
     fn laid_out(&mut self, base: &Base) -> Result<(MedialAxis, Shape), PipelineError> {
         let Some(options) = self.steady.clone() else {
@@ -362,7 +362,7 @@ impl<'a> Site<'a> {
         let axis = self.axis(base, &options)?;
         let first = shape::first(self.record, &axis, base, &options, monitor);
         let taken = match &first {
-            Ok((score, shape)) => score.close_on_the_whole(STEADY_CLOSE) && shape.has_sheets(),
+            Ok((score, shape)) => score.close(STEADY_CLOSE) && shape.has_sheets(),
             Err(error) => error.is_cancelled(),
         };
         if taken {

@@ -108,14 +108,9 @@ impl Score {
         self.sound() && self.excess <= USABLE
     }
 
-    /// Good, and within `close` of the proposal on the whole; single places may be farther.
-    pub(super) fn close_on_the_whole(&self, close: f64) -> bool {
-        self.good() && self.rough <= close
-    }
-
-    /// Close on the whole, and nowhere far.
+    /// Good, and close to the proposal: within `close` on the whole, and nowhere far.
     pub(super) fn close(&self, close: f64) -> bool {
-        self.close_on_the_whole(close) && self.farthest <= NEAR
+        self.good() && self.rough <= close && self.farthest <= NEAR
     }
 
     /// Why a body of a regular layout is not taken instead of another one: it is not good, or more than `close` or somewhere
