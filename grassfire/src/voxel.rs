@@ -53,6 +53,12 @@ impl<T> VoxelGrid<T> {
     pub fn to_grid(&self, p: &Vec3) -> Vec3 {
         (p - self.origin) / self.spacing
     }
+
+    /// Position in mm of a position in voxel units.
+    #[inline]
+    pub fn to_mm(&self, p: &Vec3) -> Vec3 {
+        self.origin + self.spacing * p
+    }
 }
 
 impl VoxelGrid<f32> {

@@ -158,7 +158,7 @@ impl Solver<'_> {
     fn side(&self, place: &Vec3, draw: &Vec3) -> Option<f64> {
         let value = |way: f64| {
             let p = place + way * REACH * draw;
-            let at = self.field.origin + self.field.spacing * p;
+            let at = self.field.to_mm(&p);
             self.field.sample(&at)
         };
         let falls = value(-1.0) - value(1.0);
@@ -215,18 +215,28 @@ impl Solver<'_> {
         let along_c = scale * (d - b).cross(draw);
         let along_d = scale * draw.cross(&(c - a));
         let change = [-along_c, -along_d, along_c, along_d];
-        let mut row: BTreeMap<u32, Vec3> = BTreeMap::new();
-        for (corner, change) in corners.iter().zip(change) {
-            let (controls, weights) = self.surface.samples.row(*corner as usize);
-            for (p, w) in controls.iter().zip(weights) {
-                *row.entry(*p).or_default() += *w * change;
-            }
-        }
+        let row = self.row_of(&corners, |k, w| w * change[k]);
         let here: f64 = row.iter().map(|(p, w)| w.dot(&points[*p as usize])).sum();
-        let row: Vec<(u32, Vec3)> = row.into_iter().collect();
         let wanted = here + LEAN - piece.lean;
         self.equations
             .add_row(&row, weight * weight * piece.area, wanted);
+    }
+
+    /// The row, over control points, of a sum over samples: `share` gives what the control point that has weight `w` in sample `k`
+    /// adds.
+    pub(super) fn row_of(
+        &self,
+        samples: &[u32],
+        share: impl Fn(usize, f64) -> Vec3,
+    ) -> Vec<(u32, Vec3)> {
+        let mut row: BTreeMap<u32, Vec3> = BTreeMap::new();
+        for (k, sample) in samples.iter().enumerate() {
+            let (controls, weights) = self.surface.samples.row(*sample as usize);
+            for (p, w) in controls.iter().zip(weights) {
+                *row.entry(*p).or_default() += share(k, *w);
+            }
+        }
+        row.into_iter().collect()
     }
 }
 

@@ -117,7 +117,7 @@ impl<'a> Shade<'a> {
                 let count = ((high - low) / STEP).ceil().max(1.0);
                 let at = |k: usize| dexels.place(line, low + (high - low) * k as f64 / count);
                 let points: Vec<Vec3> = (0..=count as usize).map(at).collect();
-                let place = |q: &Vec3| self.field.origin + self.field.spacing * q;
+                let place = |q: &Vec3| self.field.to_mm(q);
                 let room = -ROOM * self.field.spacing;
                 if points.iter().any(|q| self.field.sample(&place(q)) < room) {
                     continue;
@@ -172,15 +172,8 @@ impl Solver<'_> {
     /// The rows that push triangles out.
     pub(super) fn add_pushes(&mut self, pushes: &BTreeMap<u32, Push>, weight: f64) {
         for (&triangle, push) in pushes {
-            let mut row: BTreeMap<u32, Vec3> = BTreeMap::new();
             let corners = self.surface.triangles[triangle as usize];
-            for (corner, share) in corners.iter().zip(push.share) {
-                let (controls, weights) = self.surface.samples.row(*corner as usize);
-                for (p, w) in controls.iter().zip(weights) {
-                    *row.entry(*p).or_default() += share * *w * push.normal;
-                }
-            }
-            let row: Vec<(u32, Vec3)> = row.into_iter().collect();
+            let row = self.row_of(&corners, |k, w| push.share[k] * w * push.normal);
             self.equations.add_row(&row, weight * weight, push.height);
         }
     }

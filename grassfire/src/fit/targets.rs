@@ -15,7 +15,7 @@ pub(super) struct IsoSamples {
 /// The field around a point given in voxel units: value and gradient, both per voxel.
 #[inline]
 pub(super) fn value_and_gradient(field: &VoxelGrid<f32>, p: &Vec3) -> (f64, Vec3) {
-    let at = field.origin + field.spacing * p;
+    let at = field.to_mm(p);
     (field.sample(&at) / field.spacing, field.gradient(&at))
 }
 
