@@ -16,6 +16,8 @@ pub(super) struct Attempt {
     pub met: bool,
     /// It neither intersects itself nor folds.
     pub sound: bool,
+    /// Largest distance both ways, voxels.
+    pub farthest: f64,
     error: f64,
 }
 
@@ -77,6 +79,9 @@ pub(super) fn attempt(
     monitor.step(STAGE, "distances", 0.97)?;
     fitted.body_to_iso = solver.body_to_iso(&points);
     fitted.iso_to_body = solver.iso_to_body(&points);
+    fitted.farthest = solver
+        .farthest_from_iso(&points)
+        .max(fitted.iso_to_body.max);
     fitted.volume = solver.surface.volume(&points);
     fitted.mesh = solver.surface.control_mesh(&points);
     fitted.body = body;
@@ -87,6 +92,7 @@ pub(super) fn attempt(
     Ok(Attempt {
         met: sound && goal.met(&figures),
         sound,
+        farthest: figures.farthest(),
         error: goal.error(&figures),
         fitted,
     })

@@ -46,6 +46,12 @@ impl Figures {
         let [a, b] = self.both.map(|d| d.rms);
         ((a * a + b * b) / 2.0).sqrt()
     }
+
+    /// The largest distance of both ways, voxels.
+    pub fn farthest(&self) -> f64 {
+        let [a, b] = self.both.map(|d| d.max);
+        a.max(b)
+    }
 }
 
 impl Goal {
@@ -58,7 +64,7 @@ impl Goal {
     }
 
     pub fn met(&self, figures: &Figures) -> bool {
-        self.close(figures) && figures.both.iter().all(|d| d.max <= self.max)
+        self.close(figures) && figures.farthest() <= self.max
     }
 
     /// Met on the whole, if not everywhere.
@@ -69,8 +75,7 @@ impl Goal {
 
     /// Distance and volume in one number, the lower the better. Single places count by how far they are beyond the goal.
     pub fn error(&self, figures: &Figures) -> f64 {
-        let [a, b] = figures.both.map(|d| d.max);
-        let beyond = (a.max(b) / self.max.max(1e-6) - 1.0).max(0.0);
+        let beyond = (figures.farthest() / self.max.max(1e-6) - 1.0).max(0.0);
         figures.rms() / self.rms.max(1e-6) + (figures.volume - 1.0).abs() / VOLUME + beyond
     }
 }

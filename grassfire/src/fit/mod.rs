@@ -42,6 +42,9 @@ pub(crate) const STAGE: &str = "fit";
 /// Evenness of the starts in turn, over that of the options. Which of them follows a part best cannot be told beforehand: a
 /// lively net reaches tips and gets stuck where it is crowded, a calm one does neither.
 const CALM: [f64; 3] = [1.0, 10.0, 3.0];
+/// Starts after the second are made only for places farther off than this many times the goal for rms distance (1.5 voxels by
+/// default): they seldom help the rest.
+const FAR: f64 = 10.0;
 
 /// Quads of all starts together, at most: large bodies take long, and get fewer starts.
 const MANY_QUADS: usize = 4000;
@@ -50,8 +53,9 @@ const MANY_QUADS: usize = 4000;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FitOptions {
-    /// Starts with nets of different evenness, at most; there is another one only if the last was sound but did not
-    /// meet the goal, and the body has at most 2000 quads; the best is kept.
+    /// Starts with nets of different evenness, at most; the best is kept. There is a second one only if the first was sound
+    /// but did not meet the goal, and the body has at most 2000 quads; a third one only if a place is still farther off than
+    /// ten times the goal, and the body has at most 1333 quads.
     pub starts: u32,
     /// Gauss-Newton rounds against the iso-surface.
     pub rounds: u32,
@@ -204,10 +208,13 @@ pub struct Fitted {
     pub folds_before_untangling: u32,
     /// Patches that still fold after untangling, by quad; empty when all is well.
     pub folds: Vec<Fold>,
-    /// Limit surface to iso-surface (first-order distance |f| / |grad f|).
+    /// Limit surface to iso-surface (length of the flow along the gradient).
     pub body_to_iso: Distances,
     /// Iso-surface to limit surface (nearest triangle among those around the nearest sample).
     pub iso_to_body: Distances,
+    /// Largest distance of both, mm, where a flow counts no more than the way to the nearest sample of the iso-surface: in a narrow
+    /// groove it leads far along the floor.
+    pub farthest: f64,
     /// Volume inside the limit surface, mm3.
     pub volume: f64,
     /// Volume of the region f > 0, mm3.
@@ -331,7 +338,10 @@ pub fn fit(
         if best.as_ref().is_none_or(|best| tried.better_than(best)) {
             best = Some(tried);
         }
-        if ended {
+        let far = best
+            .as_ref()
+            .is_some_and(|best| best.farthest > FAR * options.goal);
+        if ended || (starts > 1 && !far) {
             break;
         }
     }

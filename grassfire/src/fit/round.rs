@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::data::{Nearby, Samples, nearest_samples};
 use super::equations::{Equations, solve};
 use super::surface::Surface;
-use super::targets::{IsoSamples, PointGrid, flow_to_surface};
+use super::targets::{IsoSamples, PointGrid, flow_to_surface, value_and_gradient};
 use super::{Distances, FitError, FitOptions, FitRound};
 use crate::Vec3;
 use crate::voxel::VoxelGrid;
@@ -45,6 +45,10 @@ pub(super) struct Schedule {
 const SUNK_FROM: u32 = 8;
 /// Fairness around such samples is at least this: a slit that closes over must smooth out on the whole.
 const SUNK_FAIRNESS: f64 = 0.3;
+/// A flow to the surface that is longer than this may not be the shortest, voxels.
+const LONG: f64 = 0.8;
+/// Steps of a point of the surface towards the foot of another.
+const SLIDES: u32 = 4;
 /// Evenness around samples that are far off is at least this: nets that are crowded there cannot move.
 const FAR_EVENNESS: f64 = 0.1;
 
@@ -181,15 +185,52 @@ impl<'a> Solver<'a> {
         self.options.fold_limit
     }
 
-    /// Distances of the limit surface to f = 0, by flow along the gradient.
+    /// Distances of the limit surface to f = 0, by flow along the gradient. In a narrow groove that may lead far along its
+    /// floor: a distance that rounds should lower, if not the shortest one.
     pub fn body_to_iso(&self, points: &[Vec3]) -> Distances {
+        self.from_body(points, |p| self.flow(p))
+    }
+
+    /// The largest of them, mm, where a long flow counts no more than the way to the surface near the nearest sample of f = 0.
+    pub fn farthest_from_iso(&self, points: &[Vec3]) -> f64 {
+        let iso = &self.iso.points;
+        let grid = PointGrid::new(iso, 1.5);
+        let shortest = |p: &Vec3| {
+            let flown = self.flow(p);
+            let nearest = (flown > LONG).then(|| grid.nearest(iso, p)).flatten();
+            nearest.map_or(flown, |(q, _)| self.slid(p, iso[q as usize]).min(flown))
+        };
+        self.from_body(points, shortest).max
+    }
+
+    /// Distance of `p` to the surface f = 0 near its point `q`, which slides towards the foot of `p`, voxels.
+    fn slid(&self, p: &Vec3, mut q: Vec3) -> f64 {
+        let mut least = (p - q).norm();
+        for _ in 0..SLIDES {
+            let (_, gradient) = value_and_gradient(self.field, &q);
+            let Some(normal) = gradient.try_normalize(1e-9) else {
+                break;
+            };
+            let way = p - q;
+            q = flow_to_surface(self.field, &(q + way - normal * way.dot(&normal)), 6).0;
+            least = least.min((p - q).norm());
+        }
+        least
+    }
+
+    /// Length of the way of `p` to f = 0 along the gradient, voxels.
+    fn flow(&self, p: &Vec3) -> f64 {
+        (flow_to_surface(self.field, p, 12).0 - p).norm()
+    }
+
+    fn from_body(
+        &self,
+        points: &[Vec3],
+        distance: impl Fn(&Vec3) -> f64 + Sync + Send,
+    ) -> Distances {
         let at = self.surface.samples.apply(points);
         let (_, areas) = self.surface.normals_and_areas(&at);
-        let distances: Vec<f64> = at
-            .par_iter()
-            .with_min_len(512)
-            .map(|p| (flow_to_surface(self.field, p, 12).0 - p).norm())
-            .collect();
+        let distances: Vec<f64> = at.par_iter().with_min_len(512).map(distance).collect();
         self.summary(distances.into_iter().zip(areas).collect())
     }
 

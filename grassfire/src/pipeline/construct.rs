@@ -350,8 +350,8 @@ impl<'a> Site<'a> {
         Ok((axis, shape))
     }
 
-    /// Medial axis and fitted body: of steady limits when that is close, else of the usual ones unless it is farther. What was given
-    /// up is not tried again.
+    /// Medial axis and fitted body: of steady limits when that is close, else of the usual ones when that is good. What was given up
+    /// is not tried again.
     fn laid_out(&mut self, base: &Base) -> Result<(MedialAxis, Shape), PipelineError> {
         let Some(options) = self.steady.clone() else {
             let (axis, tried) = self.usual(base)?;
@@ -362,7 +362,7 @@ impl<'a> Site<'a> {
         let axis = self.axis(base, &options)?;
         let first = shape::first(self.record, &axis, base, &options, monitor);
         let taken = match &first {
-            Ok((score, shape)) => score.close(STEADY_CLOSE) && shape.has_sheets(),
+            Ok((score, shape)) => score.near(STEADY_CLOSE) && shape.has_sheets(),
             Err(error) => error.is_cancelled(),
         };
         if taken {
@@ -379,7 +379,13 @@ impl<'a> Site<'a> {
             // A plate whose holes leave narrow strips would be a frame of beams.
             Some("no sheet of the part is left".to_owned())
         } else {
-            shape::refusal(&first, &second, close)
+            // Fewer faces are not worth a place that is far off where the usual limits give a good body.
+            let good = second
+                .as_ref()
+                .is_ok_and(|(score, shape)| score.good() && !shape.wrapped);
+            let far = first.as_ref().ok().filter(|_| good);
+            let far = far.map(|(score, _)| score.distances());
+            shape::refusal(&first, &second, close).or(far)
         };
         if self.steady_refused.is_some() {
             self.steady = None;

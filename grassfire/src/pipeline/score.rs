@@ -61,8 +61,10 @@ pub(super) struct Score {
     excess: f64,
     /// Root mean square distance, or half of what 95 % are within when that is more, voxels.
     pub(super) rough: f64,
-    /// Largest distance, voxels.
+    /// Largest distance along the field's gradient, voxels.
     farthest: f64,
+    /// Largest shortest distance, voxels.
+    shortest: f64,
 }
 
 /// The fit measures on its own samples; the final figures may be a little worse.
@@ -87,6 +89,7 @@ impl Score {
             excess: distance.max(volume) / MARGIN,
             rough: rms.max(p95 / 2.0),
             farthest: both.iter().map(|d| d.max).fold(0.0, f64::max) / voxel,
+            shortest: fitted.farthest / voxel,
         }
     }
 
@@ -113,6 +116,19 @@ impl Score {
         self.good() && self.rough <= close && self.farthest <= NEAR
     }
 
+    /// How far the body is from the proposal, in words.
+    pub(super) fn distances(&self) -> String {
+        let (rough, farthest) = (self.rough, self.farthest);
+        format!(
+            "the body is {rough:.2} voxels (rms) and at most {farthest:.1} voxels from the proposal"
+        )
+    }
+
+    /// The same, the floors of narrow grooves measured to what is nearest; the fit's own measure there is pessimistic.
+    pub(super) fn near(&self, close: f64) -> bool {
+        self.good() && self.rough <= close && self.shortest <= SAME * NEAR
+    }
+
     /// Why a body of a regular layout is not taken instead of another one: it is not good, or more than `close` or somewhere
     /// far from the proposal, and farther than the other.
     pub(super) fn refused_for(&self, other: &Self, close: f64) -> Option<String> {
@@ -124,10 +140,8 @@ impl Score {
             && (farther(self.rough, other.rough, close)
                 || farther(self.farthest, other.farthest, NEAR));
         refused.then(|| {
-            format!(
-                "the body is {:.2} voxels (rms) and at most {:.1} voxels from the proposal, that of the plain one {:.2} and {:.1}",
-                self.rough, self.farthest, other.rough, other.farthest
-            )
+            let (distances, rough, farthest) = (self.distances(), other.rough, other.farthest);
+            format!("{distances}, that of the plain one {rough:.2} and {farthest:.1}")
         })
     }
 
@@ -178,6 +192,7 @@ mod tests {
             excess: 0.5,
             rough: 0.2,
             farthest,
+            shortest: farthest,
         };
         let (torn, close) = (score(4.0), score(1.0));
         assert!(close.good() && !torn.good() && torn.sound());
@@ -192,6 +207,7 @@ mod tests {
             excess: 0.5,
             rough,
             farthest,
+            shortest: farthest,
         };
         let refused = |regular: &Score, plain: &Score| regular.refused_for(plain, 0.22).is_some();
         // Close: taken without another try, and whatever that gave.

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ReconstructOptions;
+use crate::fit::FitOptions;
 
 /// Limits that decide what is a sheet, a member, a node or a remnant of one; each stands for the option of its name in `medial` or
 /// `skeleton`.
@@ -38,6 +39,10 @@ impl Default for SteadyLimits {
     }
 }
 
+/// Starts of the fit with steady limits, unless the user chose how many: their bodies have fewer quads to follow grooves with, and
+/// one place that stays too far off costs the whole body.
+const STARTS: u32 = 3;
+
 impl SteadyLimits {
     fn of(options: &ReconstructOptions) -> Self {
         let (medial, skeleton) = (&options.medial, &options.skeleton);
@@ -64,6 +69,9 @@ pub(super) fn steady(options: &ReconstructOptions) -> Option<ReconstructOptions>
     steady.medial.neck_length = limits.neck_length;
     steady.skeleton.slight_spur = limits.slight_spur;
     steady.skeleton.node_distance = limits.node_distance;
+    if options.fit.starts == FitOptions::default().starts {
+        steady.fit.starts = STARTS;
+    }
     Some(steady)
 }
 
@@ -76,6 +84,7 @@ mod tests {
         let mut options = ReconstructOptions::default();
         let first = steady(&options).expect("on by default");
         assert_eq!(SteadyLimits::of(&first), SteadyLimits::default());
+        assert_eq!(first.fit.starts, STARTS);
         options.medial.sheet_ratio = 1.0;
         assert!(steady(&options).is_none());
         options = ReconstructOptions::default();
