@@ -11,6 +11,11 @@ use crate::voxel::VoxelGrid;
 const REACH: f64 = 4.0;
 /// Outside the walls the drawing fades over this many voxels; over more of them members would lose volume.
 const FADE: f64 = 1.0;
+/// What stands over a wall by up to the first number of voxels is the proposal's copy of the body alone, as rough as its own voxels; from
+/// the second on it is a member.
+const FILM: [f64; 2] = [1.5, 2.5];
+/// The body stays below walls at least so far where there is a film, voxels.
+const BELOW: f64 = 0.5;
 /// Surfaces of proposal and body whose normals differ by less than the first cosine run along each other; from the
 /// second on they count as crossing.
 const ALONG: [f64; 2] = [0.8, 0.3];
@@ -20,11 +25,18 @@ const ALONG: [f64; 2] = [0.8, 0.3];
 /// A proposal contains its non-design bodies, so a body fitted to it hugs their walls, and the union is full of slivers.
 /// 1. Where the proposal's surface runs along a wall it is drawn `depth` mm into that body, fading out over one voxel
 ///    around it. Where a member meets the wall it runs on into it.
-/// 2. In a bore it is moved `depth` mm into the hole, which is cut after the union: an eye keeps its thickness.
+/// 2. Where `films` go, one over a wall, up to 1.5 voxels thick, does: there the body ends half a voxel below the wall. From 2.5 voxels
+///    on it stays.
+/// 3. In a bore it is moved `depth` mm into the hole, which is cut after the union: an eye keeps its thickness.
 ///
 /// `field` is the signed distance to the proposal, mm, positive inside. The topology of the result may differ from that
 /// of `field`; it is for fitting only. It does not depend on the number of threads.
-pub fn clear_of(field: &VoxelGrid<f32>, bosses: &Bosses, depth: f64) -> VoxelGrid<f32> {
+pub fn clear_of(
+    field: &VoxelGrid<f32>,
+    bosses: &Bosses,
+    depth: f64,
+    films: bool,
+) -> VoxelGrid<f32> {
     let bvh = Bvh::new(&bosses.surface);
     let (Some((lo, hi)), true) = (bvh.bounds(), depth > 0.0) else {
         return field.clone();
@@ -32,7 +44,9 @@ pub fn clear_of(field: &VoxelGrid<f32>, bosses: &Bosses, depth: f64) -> VoxelGri
     let winding = Winding::new(&bvh);
     let voxel = field.spacing;
     let reach = REACH * voxel;
-    let margin = Vec3::repeat(FADE * voxel);
+    let outside = if films { FILM[1] } else { FADE } * voxel;
+    let below = depth.min(BELOW * voxel);
+    let margin = Vec3::repeat(outside);
     let near = |p: &Vec3| (0..3).all(|a| lo[a] - margin[a] <= p[a] && p[a] <= hi[a] + margin[a]);
     let value = |(index, &f): (usize, &f32)| {
         let [i, j, k] = field.ijk(index);
@@ -45,7 +59,7 @@ pub fn clear_of(field: &VoxelGrid<f32>, bosses: &Bosses, depth: f64) -> VoxelGri
         let nearest = bvh.nearest(&p, reach);
         let distance = nearest.map_or(reach, |n| n.distance);
         let s = if inside { distance } else { -distance };
-        if s <= -FADE * voxel {
+        if s <= -outside {
             return f as f32;
         }
         let along = nearest.map_or(0.0, |n| {
@@ -59,6 +73,9 @@ pub fn clear_of(field: &VoxelGrid<f32>, bosses: &Bosses, depth: f64) -> VoxelGri
             ((cosine - ALONG[1]) / (ALONG[0] - ALONG[1])).clamp(0.0, 1.0)
         });
         let drawn = f - depth * along * (1.0 + s / (FADE * voxel)).clamp(0.0, 1.0);
+        let film = along * ((FILM[1] - (f - s) / voxel) / (FILM[1] - FILM[0])).clamp(0.0, 1.0);
+        let film = if films { film } else { 0.0 };
+        let drawn = drawn.min(f + film * ((s - below).min(f) - f));
         let band = bosses
             .bores
             .iter()
@@ -128,13 +145,39 @@ mod tests {
             surface: ball(5.0),
             ..Bosses::default()
         };
-        let cleared = clear_of(&grid(proposal), &bosses, 0.5);
+        let cleared = clear_of(&grid(proposal), &bosses, 0.5, false);
         // The wall's own surface has moved in by the depth, away from the member.
         assert!((cleared.sample(&Vec3::new(0.0, 4.5, 0.0))).abs() < 0.05);
         assert!((cleared.sample(&Vec3::new(0.0, 0.0, -4.5))).abs() < 0.05);
         // The bar goes through the wall as thick as before.
         assert!(cleared.sample(&Vec3::new(5.0, 1.8, 0.0)) > 0.0);
         assert!((cleared.sample(&Vec3::new(7.0, 2.0, 0.0))).abs() < 0.02);
+    }
+
+    /// The copy of a boss in a proposal of coarse voxels was larger than the boss here and there, and stood out of its wall in patches.
+    #[test]
+    fn a_film_over_a_wall_goes_and_a_thick_member_along_it_stays() {
+        // A ball 1.2 voxels larger than its body, and a bar; another 4 voxels larger.
+        let bar = |p: &Vec3| 2.0 - p.yz().norm();
+        let bosses = Bosses {
+            surface: ball(5.0),
+            ..Bosses::default()
+        };
+        let cleared = |more: f64| {
+            clear_of(
+                &grid(|p| (5.0 + more - p.norm()).max(bar(p))),
+                &bosses,
+                0.5,
+                true,
+            )
+        };
+        let film = cleared(0.6);
+        for p in [Vec3::new(0.0, 4.9, 0.0), Vec3::new(0.0, 0.0, -5.3)] {
+            assert!(film.sample(&p) < 0.0);
+        }
+        assert!(film.sample(&Vec3::new(0.0, 4.6, 0.0)) > 0.0);
+        assert!(film.sample(&Vec3::new(6.5, 1.0, 0.0)) > 0.5);
+        assert!(cleared(2.0).sample(&Vec3::new(0.0, 6.9, 0.0)) > 0.0);
     }
 
     #[test]
@@ -155,6 +198,7 @@ mod tests {
                 ..Bosses::default()
             },
             0.5,
+            false,
         );
         assert!(cleared.sample(&Vec3::new(2.6, 0.0, 0.0)) > 0.0);
         assert!(cleared.sample(&Vec3::new(2.3, 0.0, 0.0)) < 0.0);
@@ -165,7 +209,7 @@ mod tests {
     fn without_bodies_nothing_changes() {
         let field = grid(|p| 5.0 - p.norm());
         assert_eq!(
-            clear_of(&field, &Bosses::default(), 0.5).values,
+            clear_of(&field, &Bosses::default(), 0.5, true).values,
             field.values
         );
     }

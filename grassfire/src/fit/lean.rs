@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::guard::guarded_step;
 use super::round::Solver;
-use super::shade::Shade;
+use super::shade::{Gaps, Pushes, Shade};
 use super::surface::Surface;
 use super::tangles::Tangles;
 use super::targets::{IsoSamples, flow_to_surface};
@@ -39,11 +39,11 @@ const WEIGHT: f64 = 20.0;
 /// Weight of a place beside a gap, a voxel away from where it must be, at first.
 const PUSH: f64 = 4.0;
 /// Growth of both in a round.
-const GROWTH: f64 = 1.5;
+const GROWTH: f64 = 1.1;
 /// Weight of bending what is added, against moving it.
 const FAIRNESS: f64 = 1.0;
 /// A control point moves by at most this, voxels.
-const MOST: f64 = 1.0;
+const MOST: f64 = 1.5;
 
 /// A piece of an upright wall.
 struct Piece {
@@ -61,9 +61,10 @@ struct Piece {
 /// 1. Pieces of upright walls (16 a quad) know from the proposal on which side of the parting they lie: along the draw direction its
 ///    field falls away from the parting. Pieces that overhang in the proposal, too, or lie hidden in `bosses` are left alone.
 /// 2. Rounds turn the pieces that lean inwards by less than half a degree (linearised, with a weight that grows), by the least
-///    move of control points at the same volume, bent as little as possible. At the same time the body's side moves out past
+///    further move of control points at the same volume, bent as little as possible. At the same time the body's side moves out past
 ///    every gap between material along the draw direction (lines a quarter of a voxel apart, through body and `bosses`)
-///    which the proposal does not have. Steps are shortened where they would create an intersection or a fold.
+///    which the proposal does not have, or a film that stands over it moves in. Steps are shortened where they would create an
+///    intersection or a fold.
 /// 3. The round that leaves the least overhang and gaps is kept.
 ///
 /// `field` is the signed distance to the proposal, mm, positive inside.
@@ -77,7 +78,12 @@ pub fn leaned(
     monitor: &Monitor,
 ) -> Result<Option<ControlMesh>, FitError> {
     let (surface, iso) = (Surface::new(&fitted.body, field)?, IsoSamples::default());
-    let mut solver = Solver::new(surface, field, &iso, options)?;
+    let options = FitOptions {
+        // Steps may come as near to a fold as the limit itself: places beside walls are stuck otherwise.
+        fold_limit: options.fold_limit / 2.0,
+        ..*options
+    };
+    let mut solver = Solver::new(surface, field, &iso, &options)?;
     let start: Vec<Vec3> = fitted
         .mesh
         .points
@@ -85,45 +91,63 @@ pub fn leaned(
         .map(|p| field.to_grid(p))
         .collect();
     solver.volume = Some(solver.surface.volume(&start));
-    let mut shade = Shade::new(field, draw, bosses);
-    let mut least = solver.left(&start, &shade);
+    let shade = Shade::new(field, draw, bosses);
+    let mut pushes = Pushes::default();
+    let mut now = solver.look(&start, &shade);
+    let mut least = now.left();
     let mut found = Tangles::of(&solver, &start);
     let (mut here, mut best) = (start.clone(), None);
     let (mut weights, mut idle) = ([WEIGHT, PUSH], 0);
     for round in 0..ROUNDS {
-        if least.iter().sum::<f64>() <= 0.0 || idle == PATIENCE {
+        if least <= 0.0 || idle == PATIENCE {
             break;
         }
         let part = f64::from(round) / f64::from(ROUNDS);
         monitor.step(STAGE, "upright walls", part)?;
+        pushes.renew(&now.gaps);
         let wanted = solver
-            .turned(&start, &here, &mut shade, weights)
+            .turned(&start, &here, (&now, &pushes), draw, weights)
             .map_err(|reason| FitError::Solver { round, reason })?;
         let Some(step) = guarded_step(&mut solver, &here, &wanted, &found) else {
             break;
         };
         (here, found) = step;
-        let now = solver.left(&here, &shade);
+        now = solver.look(&here, &shade);
+        weights = weights.map(|weight| weight * GROWTH);
         idle += 1;
-        if now[0] < least[0] {
-            weights[0] *= GROWTH;
-        }
-        weights[1] *= GROWTH;
-        if now.iter().sum::<f64>() < least.iter().sum() {
-            (least, idle) = (now, 0);
+        if now.left() < least {
+            (least, idle) = (now.left(), 0);
             best = Some(here.clone());
         }
     }
     Ok(best.map(|points| solver.surface.control_mesh(&points)))
 }
 
-impl Solver<'_> {
+/// What is wrong with a body.
+struct Looked {
+    /// Its samples, voxels.
+    at: Vec<Vec3>,
+    /// Pieces of upright walls.
+    pieces: Vec<Piece>,
+    gaps: Gaps,
+}
+
+impl Looked {
     /// What is left, squared voxels: area times lean of what overhangs, and the area of gaps as seen along the draw direction.
-    fn left(&self, points: &[Vec3], shade: &Shade) -> [f64; 2] {
+    fn left(&self) -> f64 {
+        let overhang = self.pieces.iter().map(|p| p.area * (-p.lean).max(0.0));
+        overhang.sum::<f64>() + self.gaps.area
+    }
+}
+
+impl Solver<'_> {
+    fn look(&self, points: &[Vec3], shade: &Shade) -> Looked {
         let at = self.surface.samples.apply(points);
-        let pieces = self.upright(&at, shade);
-        let overhang = pieces.iter().map(|p| p.area * (-p.lean).max(0.0)).sum();
-        [overhang, shade.area(&self.surface.triangle_mesh(at))]
+        Looked {
+            pieces: self.upright(&at, shade),
+            gaps: shade.gaps(&self.surface.triangle_mesh(at.clone())),
+            at,
+        }
     }
 
     /// The pieces of upright walls.
@@ -165,33 +189,30 @@ impl Solver<'_> {
         (falls != 0.0).then(|| falls.signum())
     }
 
-    /// Control points whose walls lean, those of `here` turned, as near to `start` as may be.
+    /// Control points whose walls lean: those of `here`, moved as little as may be, and at most [`MOST`] away from `start`.
     fn turned(
         &mut self,
         start: &[Vec3],
         here: &[Vec3],
-        shade: &mut Shade,
+        (now, pushes): (&Looked, &Pushes),
+        draw: &Vec3,
         [turning, pushing]: [f64; 2],
     ) -> Result<Vec<Vec3>, String> {
-        let at = self.surface.samples.apply(here);
-        shade.look(&self.surface.triangle_mesh(at.clone()));
-        let (normals, areas) = self.surface.normals_and_areas(&at);
+        let (normals, areas) = self.surface.normals_and_areas(&now.at);
         let mean_area = areas.iter().sum::<f64>() / here.len().max(1) as f64;
         self.equations.clear();
-        for (p, place) in start.iter().enumerate() {
+        for (p, place) in here.iter().enumerate() {
             self.equations.pin(p as u32, mean_area, place);
             let (indices, weights) = self.surface.bending.row(p);
             let block = FAIRNESS * mean_area * Matrix3::identity();
-            let bent = self.surface.bending.apply_row(p, start);
+            let bent = self.surface.bending.apply_row(p, here);
             self.equations
                 .add(indices, weights, &block, &(block * bent));
         }
-        for piece in self.upright(&at, shade) {
-            if piece.lean < LEAN {
-                self.add_turn(&piece, here, &at, (shade.draw(), turning));
-            }
+        for piece in now.pieces.iter().filter(|piece| piece.lean < LEAN) {
+            self.add_turn(piece, here, &now.at, (draw, turning));
         }
-        self.add_pushes(&shade.pushes, pushing);
+        self.add_pushes(pushes, &now.at, pushing);
         let mut points = self.solution(&normals, &areas)?;
         for (p, from) in points.iter_mut().zip(start) {
             let way = *p - from;

@@ -219,11 +219,11 @@ pub(super) fn mould_of(
     let mut finished = None;
     if options.repairs() {
         let mut asked = options.repair_options(0.0, cell);
-        asked.bores.clone_from(&bodies.bosses.free);
+        asked.bores = bodies.bosses.cored();
         let draw = Vec3::from(draw).normalize();
         finished = Some(record.stage("mould", || {
             monitor.check()?;
-            Ok::<_, StageError>(remaining(part, &draw, &asked).0)
+            Ok::<_, StageError>(remaining(part, &draw, &asked))
         })?);
     }
     let options = MouldOptions {
@@ -243,7 +243,8 @@ pub(super) fn mould_of(
         repaired_volume: before.repaired_volume,
         multiple_lines_before: before.multiple_lines_before,
         multiple_lines: before.multiple_lines,
-        multiple_lines_finished: finished,
+        multiple_lines_finished: finished.map(|left| left.0),
+        undercut_finished: finished.map(|left| left.1),
         ..block
     });
     Ok(())
@@ -312,6 +313,7 @@ fn mould_block(found: &Mould) -> MouldBlock {
         multiple_lines_before: repaired.map(|r| r.multiple[0]),
         multiple_lines: repaired.map(|r| r.multiple[1]),
         multiple_lines_finished: None,
+        undercut_finished: None,
     }
 }
 

@@ -290,7 +290,9 @@ impl<'a> Site<'a> {
                 // They are made from the proposal's own walls, too thin for a body to end inside them.
                 remeshed.field.clone()
             } else {
-                clear_of(&remeshed.field, &bodies.bosses, depth)
+                // A repair's draft widens the proposal's copies of them.
+                let films = options.mould.leans().is_some();
+                clear_of(&remeshed.field, &bodies.bosses, depth, films)
             };
             let rise = options.flats.raise * voxel;
             Ok::<_, StageError>(raised(&clear, &bodies.flats, rise).unwrap_or(clear))

@@ -9,11 +9,9 @@ use super::{ReconstructJob, ReconstructOptions, finish, prepared, rebuild, verif
 use crate::Vec3;
 use crate::case::Case;
 use crate::casting::mould::{
-    self, Conflict, Repair, RepairOptions, Room, best_direction, choose, conflicts, dexels,
-    parting, remaining, rooms,
+    self, Conflict, Repair, Room, best_direction, choose, conflicts, dexels, parting, rooms,
 };
 use crate::edit::Edit;
-use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
 use crate::remesh::Remeshed;
 use crate::report::{RepairsBlock, Report, RoomBlock, VariantBlock};
@@ -62,8 +60,6 @@ impl Way {
 struct Search<'a> {
     job: &'a ReconstructJob,
     draw: Vec3,
-    /// How the proposal is repaired, without a choice for any room.
-    base: RepairOptions,
     rooms: Vec<Room>,
     ways: Vec<Vec<Way>>,
     /// Of one core, mm3 of metal.
@@ -158,7 +154,6 @@ impl<'a> Search<'a> {
             job,
             draw,
             price: asked.core_price.unwrap_or(PRICE * from.solid.volume()),
-            base,
             rooms,
             ways,
             loads: job.loads.clone().map(comparable),
@@ -219,11 +214,7 @@ impl<'a> Search<'a> {
         match self.made(&name, ways, monitor) {
             Err(error) if error.is_cancelled() => return Err(error),
             Err(error) => row.error = Some(format!("{}: {}", error.stage, error.source)),
-            Ok((report, mesh)) => {
-                fill_row(&mut row, &report);
-                let (lines, undercut) = self.left(ways, &mesh);
-                (row.lines, row.undercut) = (Some(lines), Some(undercut));
-            }
+            Ok(report) => fill_row(&mut row, &report),
         }
         row.name = name;
         let metal = row.volume.map(|v| v + row.cores as f64 * self.price);
@@ -242,7 +233,7 @@ impl<'a> Search<'a> {
         name: &str,
         ways: &[usize],
         monitor: &Monitor,
-    ) -> Result<(Report, TriMesh), PipelineError> {
+    ) -> Result<Report, PipelineError> {
         let mut options = self.options(ways);
         options.report.pictures = false;
         let variant = ReconstructJob {
@@ -262,15 +253,7 @@ impl<'a> Search<'a> {
         }
         let options = &variant.options.report;
         let outcome = finish(record, &made.delivery, &[], options, monitor)?;
-        Ok((outcome.report, made.mesh))
-    }
-
-    /// Lines of a finished part with more than one interval, and its undercut, mm3, both without the cores.
-    fn left(&self, ways: &[usize], mesh: &TriMesh) -> (usize, f64) {
-        let cores = self.picked(ways).filter(|w| *w.1 == Way::Core);
-        let mut asked = self.base.clone();
-        asked.cores.extend(cores.map(|(room, _)| room.place));
-        remaining(mesh, &self.draw, &asked)
+        Ok(outcome.report)
     }
 
     fn block(self) -> RepairsBlock {
@@ -340,6 +323,8 @@ fn fill_row(row: &mut VariantBlock, report: &Report) {
     row.strain_energy = proof.map(|p| p.strain_energy);
     row.lines_before = mould.and_then(|m| m.multiple_lines_before);
     row.lines_repaired = mould.and_then(|m| m.multiple_lines);
+    row.lines = mould.and_then(|m| m.multiple_lines_finished);
+    row.undercut = mould.and_then(|m| m.undercut_finished);
     row.valid = report.solid.as_ref().is_none_or(|s| s.valid);
     // Those of the part: the proof is as rough as a comparison may be.
     let own = || {

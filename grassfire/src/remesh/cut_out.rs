@@ -59,6 +59,21 @@ pub struct Bosses {
     pub free: Vec<Capsule>,
 }
 
+/// A core is wider than its bore by up to this share of it where the bore leaves its body: there it fills the rounded rim of what
+/// stands around the mouth.
+const MOUTH: f64 = 0.5;
+
+impl Bosses {
+    /// What the cores of the bores make: their free lengths, and the mouths of these outside the bodies.
+    pub fn cored(&self) -> Vec<Capsule> {
+        let mouths = self.bores.iter().zip(&self.free).flat_map(|(wall, free)| {
+            let radius = (1.0 + MOUTH) * wall.radius;
+            [(free.a, wall.a), (wall.b, free.b)].map(|(a, b)| Capsule { a, b, radius })
+        });
+        self.free.iter().cloned().chain(mouths).collect()
+    }
+}
+
 /// The proposal without its non-design bodies.
 #[derive(Debug, Clone)]
 pub struct DesignPart {

@@ -153,6 +153,9 @@ pub struct MouldBlock {
     /// In the finished part, without what cores make.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub multiple_lines_finished: Option<usize>,
+    /// What is undercut on them, mm3.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub undercut_finished: Option<f64>,
 }
 
 /// An inner edge between the fitted body and a non-design body that was to get a fillet.

@@ -145,6 +145,7 @@ mod tests {
     use super::*;
     use crate::casting::mould::Repair;
     use crate::mesh::shapes::cuboid;
+    use crate::remesh::Bosses;
 
     fn asked(cores: Vec<Vec3>, bores: Vec<Capsule>) -> RepairOptions {
         RepairOptions {
@@ -205,5 +206,32 @@ mod tests {
         }
         let groove = vec![Vec3::zeros(), Vec3::new(3.0, 0.0, -8.5)];
         assert_eq!(remaining(&part, &z, &asked(groove, vec![])), (0, 0.0));
+    }
+
+    /// What stood over the rim of an eye had a rounded mouth around the bore: its lines were counted, though the bore's core makes it.
+    #[test]
+    fn the_rounded_mouth_of_a_bore_is_its_core() {
+        let [bore, free] = [4.0, 8.0].map(|half| Capsule {
+            a: Vec3::new(-half, 0.0, 0.0),
+            b: Vec3::new(half, 0.0, 0.0),
+            radius: 3.0,
+        });
+        let cored = Bosses {
+            bores: vec![bore],
+            free: vec![free],
+            ..Bosses::default()
+        };
+        let cored = cored.cored();
+        // A lip of 2 mm beside the eye, open from z = -4 to 4, and as much in the eye itself.
+        let mut lips = TriMesh::default();
+        for (from, to) in [(4.0, 6.0), (0.0, 2.0)] {
+            for z in [-8.0, 4.0] {
+                let lip = cuboid(Vec3::new(from, -1.0, z), Vec3::new(to, 1.0, z + 4.0));
+                lips.append(lip.points.iter().copied(), lip.triangles.iter().copied());
+            }
+            let (lines, volume) = remaining(&lips, &Vec3::z(), &asked(vec![], cored.clone()));
+            let most = if from > 0.0 { 0.0 } else { 8.0 };
+            assert!((volume - most).abs() < 3.0, "{volume} mm3 on {lines} lines");
+        }
     }
 }
