@@ -43,15 +43,22 @@ cargo test --release --locked --workspace --no-run
 step demo
 "$target/release/grassfire" demo wishbone -o "$demo/wishbone" -q || [ $? -eq 1 ]
 
-step outside checks
-tools/outside-check.sh "$demo/wishbone"
+# One core's work, and a download: beside the tests.
+step outside checks start
+tools/outside-check.sh "$demo/wishbone" >"$demo/outside.log" 2>&1 &
+outside=$!
 
 # Tests on real and on bad parts look for the corpus beside the repository or in GRASSFIRE_CORPUS, and say so when it
 # is not there.
 step tests
+failed=0
 if cargo nextest --version >/dev/null 2>&1; then
-  cargo nextest run --release --locked --workspace --no-fail-fast
+  cargo nextest run --release --locked --workspace --no-fail-fast || failed=$?
 else
-  cargo test --release --locked --workspace --no-fail-fast
+  cargo test --release --locked --workspace --no-fail-fast || failed=$?
 fi
+step outside checks
+wait "$outside" || failed=$?
+cat "$demo/outside.log"
+if [ "$failed" -ne 0 ]; then exit "$failed"; fi
 step done
