@@ -188,7 +188,7 @@ impl<'a> Solver<'a> {
     /// Distances of the limit surface to f = 0, by flow along the gradient. In a narrow groove that may lead far along its
     /// floor: a distance that rounds should lower, if not the shortest one.
     pub fn body_to_iso(&self, points: &[Vec3]) -> Distances {
-        self.from_body(points, |p| self.flow(p))
+        self.distances_of(points, |p| self.flow(p))
     }
 
     /// The largest of them, mm, where a long flow counts no more than the way to the surface near the nearest sample of f = 0.
@@ -200,7 +200,7 @@ impl<'a> Solver<'a> {
             let nearest = (flown > LONG).then(|| grid.nearest(iso, p)).flatten();
             nearest.map_or(flown, |(q, _)| self.slid(p, iso[q as usize]).min(flown))
         };
-        self.from_body(points, shortest).max
+        self.distances_of(points, shortest).max
     }
 
     /// Distance of `p` to the surface f = 0 near its point `q`, which slides towards the foot of `p`, voxels.
@@ -223,7 +223,7 @@ impl<'a> Solver<'a> {
         (flow_to_surface(self.field, p, 12).0 - p).norm()
     }
 
-    fn from_body(
+    fn distances_of(
         &self,
         points: &[Vec3],
         distance: impl Fn(&Vec3) -> f64 + Sync + Send,
