@@ -212,8 +212,8 @@ pub struct Fitted {
     pub body_to_iso: Distances,
     /// Iso-surface to limit surface (nearest triangle among those around the nearest sample).
     pub iso_to_body: Distances,
-    /// Largest distance of both, mm, where a flow counts no more than the way to the nearest sample of the iso-surface: in a narrow
-    /// groove it leads far along the floor.
+    /// Largest distance of both, mm, where a flow counts no more than the way to the iso-surface near its nearest sample: in a
+    /// narrow groove it leads far along the floor.
     pub farthest: f64,
     /// Volume inside the limit surface, mm3.
     pub volume: f64,

@@ -376,19 +376,7 @@ impl<'a> Site<'a> {
         if second.as_ref().is_err_and(PipelineError::is_cancelled) {
             return Ok((other, second?.1));
         }
-        let sheets = |tried: &Tried| tried.as_ref().is_ok_and(|(_, shape)| shape.has_sheets());
-        self.steady_refused = if sheets(&second) && !sheets(&first) {
-            // A plate whose holes leave narrow strips would be a frame of beams.
-            Some("no sheet of the part is left".to_owned())
-        } else {
-            // Fewer faces are not worth a place that is far off where the usual limits give a good body.
-            let good = second
-                .as_ref()
-                .is_ok_and(|(score, shape)| score.good() && !shape.wrapped);
-            let far = first.as_ref().ok().filter(|_| good);
-            let far = far.map(|(score, _)| score.distances());
-            shape::refusal(&first, &second, close).or(far)
-        };
+        self.steady_refused = shape::steady_refusal(&first, &second, close);
         if self.steady_refused.is_some() {
             self.steady = None;
             return Ok((other, second?.1));

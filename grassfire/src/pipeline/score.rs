@@ -116,17 +116,17 @@ impl Score {
         self.good() && self.rough <= close && self.farthest <= NEAR
     }
 
+    /// The same, the floors of narrow grooves measured to what is nearest; the fit's own measure there is pessimistic.
+    pub(super) fn near(&self, close: f64) -> bool {
+        self.good() && self.rough <= close && self.shortest <= SAME * NEAR
+    }
+
     /// How far the body is from the proposal, in words.
     pub(super) fn distances(&self) -> String {
         let (rough, farthest) = (self.rough, self.farthest);
         format!(
             "the body is {rough:.2} voxels (rms) and at most {farthest:.1} voxels from the proposal"
         )
-    }
-
-    /// The same, the floors of narrow grooves measured to what is nearest; the fit's own measure there is pessimistic.
-    pub(super) fn near(&self, close: f64) -> bool {
-        self.good() && self.rough <= close && self.shortest <= SAME * NEAR
     }
 
     /// Why a body of a regular layout is not taken instead of another one: it is not good, or more than `close` or somewhere

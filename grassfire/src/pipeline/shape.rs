@@ -190,6 +190,21 @@ pub(super) fn refusal(first: &Tried, second: &Tried, close: f64) -> Option<Strin
     }
 }
 
+/// Why the first of two shapes, of steady limits and not near the proposal, is not taken instead of the second, of the usual ones.
+pub(super) fn steady_refusal(first: &Tried, second: &Tried, close: f64) -> Option<String> {
+    let sheets = |tried: &Tried| tried.as_ref().is_ok_and(|(_, shape)| shape.has_sheets());
+    if sheets(second) && !sheets(first) {
+        // A plate whose holes leave narrow strips would be a frame of beams.
+        return Some("no sheet of the part is left".to_owned());
+    }
+    // Fewer faces are not worth a place that is far off where the usual limits give a good body.
+    let good = second
+        .as_ref()
+        .is_ok_and(|(score, shape)| score.good() && !shape.wrapped);
+    let far = first.as_ref().ok().filter(|_| good);
+    refusal(first, second, close).or(far.map(|(score, _)| score.distances()))
+}
+
 impl Workshop<'_> {
     /// The shape of the regular layout when that is good enough, else of the plain one.
     fn layouts(&mut self) -> Tried {
