@@ -9,6 +9,7 @@ mod casting;
 mod check;
 mod construct;
 mod deliver;
+mod design;
 mod edits;
 mod error;
 mod even;
@@ -18,6 +19,7 @@ mod fewest;
 mod follow;
 mod illustrate;
 mod inputs;
+mod lay_out;
 mod measure;
 #[cfg(feature = "occt")]
 mod notches;
@@ -351,6 +353,7 @@ fn rebuild(
         regular_refused: None,
         steady: steady::steady(options).filter(|_| layout == Layout::Auto && drawn.is_none()),
         steady_refused: None,
+        wedges: false,
     };
     let made = match &fed {
         Some(grown) => site.build_grown(grown)?,

@@ -2,23 +2,22 @@
 
 use super::bodies::Bodies;
 use super::deliver::Delivery;
+use super::design::Design;
 use super::error::{PipelineError, StageError};
 use super::feeding::{Grown, fed};
 use super::fewest::fewest;
 use super::record::Record;
-use super::shape::{self, Base, Shape, Tried};
+use super::shape::{self, Base, Shape};
 use super::union::{self, Part};
 use super::{ReconstructOptions, measure};
 use crate::fit::{clear_of, raised};
-use crate::medial::{self, MedialAxis};
+use crate::medial::MedialAxis;
 use crate::mesh::Distance;
 use crate::monitor::Monitor;
-use crate::remesh::{DesignPart, Remeshed, cut_out};
+use crate::remesh::Remeshed;
 use crate::skeleton::{Layout, Skeleton};
 use crate::topology::Betti;
 
-/// A body of steady limits that is within this of the proposal on the whole is taken, voxels (rms, 95 % within twice that).
-const STEADY_CLOSE: f64 = 0.25;
 /// Times that a part is made without the bulges of flat faces that could not be cut.
 const FLAT_ROUNDS: usize = 3;
 
@@ -44,6 +43,8 @@ pub(super) struct Site<'a> {
     pub(super) steady: Option<ReconstructOptions>,
     /// Why it was, if it was.
     pub(super) steady_refused: Option<String>,
+    /// The part is made of a design part that keeps the tips of its wedges.
+    pub(super) wedges: bool,
 }
 
 /// The part with the stages before it.
@@ -134,44 +135,21 @@ impl<'a> Site<'a> {
     }
 
     fn without_bodies(&mut self) -> Result<Option<Made>, PipelineError> {
-        let (remeshed, options, monitor) = (self.remeshed, self.options, self.monitor);
-        if !options.non_design.cut_out {
+        let options = self.options;
+        if !options.non_design.cut_out || self.bodies.bosses.surface.triangles.is_empty() {
             return Ok(None);
         }
-        let bosses = &self.bodies.bosses;
-        let design = self.record.stage("cut_out", || {
-            cut_out(remeshed, bosses, &options.cut_out, monitor)
-        })?;
-        let Some(DesignPart {
-            part,
-            united,
-            wanted,
-            lost,
-        }) = design
-        else {
-            return Ok(None);
+        let design = match self.design(&options.cut_out)? {
+            Ok(design) => design,
+            Err(problem) => {
+                self.give_up(&problem);
+                return Ok(None);
+            }
         };
-        if united != wanted {
-            self.give_up(&format!(
-                "the union would have {} pieces and {} tunnels instead of {} and {}",
-                united.b0, united.b1, wanted.b0, wanted.b1
-            ));
-            return Ok(None);
-        }
-        let delivery = self.delivery;
-        self.record.stage("write", || {
-            delivery.stl("design_part.stl", part.solid.mesh())
-        })?;
-        let rise = options.flats.raise * remeshed.field.spacing;
-        let raised = raised(&part.field, &self.bodies.flats, rise);
-        let base = Base {
-            remeshed: &part,
-            target: raised.as_ref().unwrap_or(&part.field),
-            united: Some(wanted),
-            lost,
-        };
+        self.deliver_design(&design)?;
+        let base = design.base();
         let problem = |judged: &Judged| judged.as_ref().err().cloned();
-        match self.by_layouts(|site| site.united(&base, &wanted), problem)? {
+        match self.by_layouts(|site| site.united(&base, &design.cut.wanted), problem)? {
             Ok(made) => Ok(Some(made)),
             Err(problem) => {
                 self.give_up(&problem);
@@ -201,6 +179,7 @@ impl<'a> Site<'a> {
             self.monitor.keep_warnings(told);
             if self.steady.take().is_some() {
                 self.steady_refused = refused;
+                self.wedges = false;
             } else {
                 self.layout = Layout::Plain;
                 self.regular_refused = refused;
@@ -342,7 +321,11 @@ impl<'a> Site<'a> {
     /// Medial axis, skeleton and fitted body, each written as it is made.
     fn shape(&mut self, base: &Base) -> Result<(MedialAxis, Shape), PipelineError> {
         let (options, monitor, delivery) = (self.options, self.monitor, self.delivery);
-        let (axis, shape) = self.laid_out(base)?;
+        let (axis, shape, wedged) = self.laid_out(base)?;
+        if let Some(design) = &wedged {
+            self.deliver_design(design)?;
+        }
+        let base = &wedged.as_ref().map_or(*base, Design::base);
         self.record.stage("write", || delivery.medial(&axis.mesh))?;
         let shape = self.fed(shape, base)?;
         let voxel = base.remeshed.field.spacing;
@@ -350,73 +333,6 @@ impl<'a> Site<'a> {
         self.record
             .stage("write", || delivery.skeleton(&shape.skeleton.skeleton))?;
         Ok((axis, shape))
-    }
-
-    /// Medial axis and fitted body: of steady limits when that is close, else of the usual ones when that is good. What was given up
-    /// is not tried again.
-    fn laid_out(&mut self, base: &Base) -> Result<(MedialAxis, Shape), PipelineError> {
-        let Some(options) = self.steady.clone() else {
-            let (axis, tried) = self.usual(base)?;
-            return Ok((axis, tried?.1));
-        };
-        let (monitor, close) = (self.monitor, options.retry.close);
-        let told = monitor.warnings().len();
-        let axis = self.axis(base, &options)?;
-        let first = shape::first(self.record, &axis, base, &options, monitor);
-        let taken = match &first {
-            Ok((score, shape)) => score.near(STEADY_CLOSE) && shape.has_sheets(),
-            Err(error) => error.is_cancelled(),
-        };
-        if taken {
-            return Ok((axis, first?.1));
-        }
-        // What went wrong is said once, in the reason.
-        monitor.keep_warnings(told);
-        let (other, second) = self.usual(base)?;
-        if second.as_ref().is_err_and(PipelineError::is_cancelled) {
-            return Ok((other, second?.1));
-        }
-        self.steady_refused = shape::steady_refusal(&first, &second, close);
-        if self.steady_refused.is_some() {
-            self.steady = None;
-            return Ok((other, second?.1));
-        }
-        monitor.keep_warnings(told);
-        (self.layout, self.regular_refused) = (Layout::Auto, None);
-        Ok((axis, first?.1))
-    }
-
-    fn axis(
-        &mut self,
-        base: &Base,
-        options: &ReconstructOptions,
-    ) -> Result<MedialAxis, PipelineError> {
-        let monitor = self.monitor;
-        self.record.stage("medial", || {
-            medial::medial_axis(&base.remeshed.field, &options.medial, monitor)
-        })
-    }
-
-    /// Medial axis and fitted body of the usual limits; when it is not of the regular layout, that is not tried again.
-    fn usual(&mut self, base: &Base) -> Result<(MedialAxis, Tried), PipelineError> {
-        let (layout, drawn, options) = (self.layout, self.drawn, self.options);
-        let axis = self.axis(base, options)?;
-        let tried = shape::shape(
-            self.record,
-            &axis,
-            base,
-            drawn,
-            layout,
-            options,
-            self.monitor,
-        );
-        let shape = tried.as_ref().ok().map(|(_, shape)| shape);
-        let regular = shape.is_some_and(|shape| shape.layout == Layout::Regular);
-        if layout == Layout::Auto && !regular {
-            self.layout = Layout::Plain;
-            self.regular_refused = shape.and_then(|shape| shape.regular_refused.clone());
-        }
-        Ok((axis, tried))
     }
 
     /// The shape with sections that grow towards the feeders, as far as its body can follow.
@@ -473,6 +389,7 @@ impl<'a> Site<'a> {
         let mut block = measure::skeleton_block(axis, shape, layout);
         block.regular_refused.clone_from(&self.regular_refused);
         block.steady = self.steady.is_some();
+        block.wedges = self.wedges;
         block.steady_refused.clone_from(&self.steady_refused);
         report.skeleton = Some(block);
         report.body = Some(measure::body_block(shape));

@@ -49,7 +49,7 @@ pub(super) const FINE: f64 = 0.75;
 const NEAR: f64 = 1.5;
 
 /// Distances of two fits that differ by less are the same.
-const SAME: f64 = 1.1;
+pub(super) const SAME: f64 = 1.1;
 
 /// How good a fitted body is.
 pub(super) struct Score {
@@ -116,9 +116,15 @@ impl Score {
         self.good() && self.rough <= close && self.farthest <= NEAR
     }
 
-    /// The same, the floors of narrow grooves measured to what is nearest; the fit's own measure there is pessimistic.
-    pub(super) fn near(&self, close: f64) -> bool {
-        self.good() && self.rough <= close && self.shortest <= SAME * NEAR
+    /// Sound and close on the whole, if not at some place.
+    pub(super) fn close_on_the_whole(&self, close: f64) -> bool {
+        self.sound() && self.excess <= 1.0 && self.rough <= close
+    }
+
+    /// Close, the floors of narrow grooves measured to what is nearest, and `slack` times as far let pass there; the fit's own
+    /// measure there is pessimistic.
+    pub(super) fn near(&self, close: f64, slack: f64) -> bool {
+        self.good() && self.rough <= close && self.shortest <= slack * NEAR
     }
 
     /// How far the body is from the proposal, in words.

@@ -39,6 +39,9 @@ pub struct RetryOptions {
     /// Limits of the skeleton for the first try, with the regular layout; it is given up like that one, and the limits in `medial` and
     /// `skeleton` are used. None leaves it out, and so do other than the default limits there.
     pub steady: Option<SteadyLimits>,
+    /// When the body of these is close on the whole, but not at some place, they are tried once more on a design part that keeps the tips of wedges beside non-design
+    /// bodies: `cut_out.wedge` for that, voxels. None leaves it out.
+    pub wedge: Option<f64>,
 }
 
 impl Default for RetryOptions {
@@ -47,6 +50,7 @@ impl Default for RetryOptions {
             quad_sizes: vec![1.0, 0.8, 1.3, 0.65],
             close: 0.22,
             steady: Some(SteadyLimits::default()),
+            wedge: Some(0.3),
         }
     }
 }
@@ -76,6 +80,7 @@ pub(super) struct Surface {
 }
 
 /// What is made into a body: the design part or the whole proposal.
+#[derive(Clone, Copy)]
 pub(super) struct Base<'a> {
     pub(super) remeshed: &'a Remeshed,
     /// The field that bodies are fitted to.

@@ -4,11 +4,12 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::bosses::{Bosses, in_bore};
 use super::digital::VoxelSet;
-use super::{Capsule, RemeshError, Remeshed, STAGE, closed_surface, noise};
+use super::{RemeshError, Remeshed, STAGE, closed_surface, noise};
 use crate::Vec3;
 use crate::fit::volume;
-use crate::mesh::{Bvh, TriMesh, Winding};
+use crate::mesh::{Bvh, Winding};
 use crate::monitor::Monitor;
 use crate::topology::Betti;
 use crate::voxel::VoxelGrid;
@@ -22,6 +23,11 @@ pub struct CutOutOptions {
     pub skin: f64,
     /// Half of the least thickness that stays next to a body: thinner shells and burrs go.
     pub least_half_thickness: f64,
+    /// The same for material within `wedge_reach` of what is thick enough: so wedges that run out beside a body keep their tips. None
+    /// cuts them off where they are too thin. Voxels tell thicknesses to about one of them.
+    pub wedge: Option<f64>,
+    /// How far such tips reach.
+    pub wedge_reach: f64,
     /// Members run on this far into a body.
     pub run_on: f64,
     /// There they stay this far below faces of the body that lie open, so that the union cuts cleanly.
@@ -39,38 +45,14 @@ impl Default for CutOutOptions {
         Self {
             skin: 0.5,
             least_half_thickness: 0.6,
+            wedge: None,
+            wedge_reach: 6.0,
             run_on: 1.5,
             clearance: 1.0,
             slot: 1.25,
             island: 4.0,
             noise: 2.0,
         }
-    }
-}
-
-/// Non-design bodies as cutting and fitting see them.
-#[derive(Debug, Clone, Default)]
-pub struct Bosses {
-    /// Their closed surfaces, bores filled; the tag of a triangle is the number of its body.
-    pub surface: TriMesh,
-    /// The walls of their bores: a cylinder about `a`-`b` each.
-    pub bores: Vec<Capsule>,
-    /// The lengths of the bores that stay free of material, likewise.
-    pub free: Vec<Capsule>,
-}
-
-/// A core is wider than its bore by up to this share of it where the bore leaves its body: there it fills the rounded rim of what
-/// stands around the mouth.
-const MOUTH: f64 = 0.5;
-
-impl Bosses {
-    /// What the cores of the bores make: their free lengths, and the mouths of these outside the bodies.
-    pub fn cored(&self) -> Vec<Capsule> {
-        let mouths = self.bores.iter().zip(&self.free).flat_map(|(wall, free)| {
-            let radius = (1.0 + MOUTH) * wall.radius;
-            [(free.a, wall.a), (wall.b, free.b)].map(|(a, b)| Capsule { a, b, radius })
-        });
-        self.free.iter().cloned().chain(mouths).collect()
     }
 }
 
@@ -92,6 +74,8 @@ pub struct DesignPart {
 struct Lengths {
     skin: f64,
     least_half_thickness: f64,
+    wedge: Option<f64>,
+    wedge_reach: f64,
     run_on: f64,
     clearance: f64,
     slot: f64,
@@ -109,6 +93,8 @@ impl Lengths {
         Self {
             skin,
             least_half_thickness,
+            wedge: options.wedge.map(|wedge| wedge * unit),
+            wedge_reach: options.wedge_reach * unit,
             run_on: options.run_on * unit,
             clearance: options.clearance * voxel,
             slot: options.slot * voxel,
@@ -127,7 +113,8 @@ const MARGIN: usize = 3;
 /// Cuts non-design bodies out of a remeshed proposal; `None` without bodies or when nothing is left.
 ///
 /// 1. The bodies with a skin, and the free lengths of their bores, are taken away from the solid.
-/// 2. What is thinner than twice `least_half_thickness` next to them goes too: shells left of their walls, burrs.
+/// 2. What is thinner than twice `least_half_thickness` next to them goes too: shells left of their walls, burrs; with `wedge` not the
+///    tips of wedges.
 /// 3. Where material meets a body it runs on `run_on` deep into its wall, but stays `clearance` below the proposal's own
 ///    surface, so that it ends inside and the union's edges are transversal.
 /// 4. Topological noise that the cutting made is removed; the surface is extracted anew.
@@ -203,7 +190,7 @@ struct Near {
 impl Near {
     fn new(grid: &VoxelGrid<f32>, bosses: &Bosses, lengths: &Lengths) -> Self {
         let reach = lengths.reach;
-        let boxes = boxes(bosses);
+        let boxes = bosses.boxes();
         let bvh = Bvh::new(&bosses.surface);
         let winding = Winding::new(&bvh);
         let depth_at = |v: usize| {
@@ -261,13 +248,31 @@ impl Near {
         })
     }
 
-    /// Opening by balls of at least the least half thickness, within the near voxels.
+    /// What is left of the thin material beside the bodies.
     fn opened(&self, cut: &VoxelGrid<f32>, lengths: &Lengths) -> VoxelGrid<f32> {
+        let thick = self.opened_by(cut, lengths.least_half_thickness, lengths);
+        let Some(wedge) = lengths.wedge else {
+            return thick;
+        };
+        let thin = self.opened_by(cut, wedge, lengths);
+        let reach = lengths.wedge_reach;
+        let ball = Ball::new(cut, reach / cut.spacing + 1.5);
+        self.replaced(&thick, |_, v| {
+            let value = f64::from(thick.values[v]);
+            let room = f64::from(thin.values[v]);
+            if room <= value {
+                return value;
+            }
+            value.max(room.min(ball.covered(&thick, 1.0, v, 0.0) + reach))
+        })
+    }
+
+    /// Opening by balls of at least `radius` mm, within the near voxels.
+    fn opened_by(&self, cut: &VoxelGrid<f32>, radius: f64, lengths: &Lengths) -> VoxelGrid<f32> {
         let h = cut.spacing;
-        let radius = lengths.least_half_thickness;
         let ball = Ball::new(cut, radius / h + 2.0);
         // Farther out nothing was cut, and not all the neighbours that the balls need are known.
-        let last = lengths.skin + 2.0 * radius;
+        let last = lengths.skin + 2.0 * lengths.least_half_thickness;
         self.replaced(cut, |n, v| {
             let value = f64::from(cut.values[v]);
             if value <= 0.0 || value >= radius || self.depth(n) < -last {
@@ -392,37 +397,6 @@ impl Ball {
         }
         best
     }
-}
-
-/// Depth in a finite cylinder, mm, negative outside.
-fn in_bore(bore: &Capsule, p: &Vec3) -> f64 {
-    let axis = bore.b - bore.a;
-    let length = axis.norm();
-    if length <= 0.0 {
-        return f64::NEG_INFINITY;
-    }
-    let along = (p - bore.a).dot(&axis) / length;
-    let radial = (p - bore.a - axis * (along / length)).norm();
-    (bore.radius - radial).min(along).min(length - along)
-}
-
-/// The box of each body.
-fn boxes(bosses: &Bosses) -> Vec<(Vec3, Vec3)> {
-    let count = bosses.surface.tags.iter().max().map_or(0, |t| t + 1);
-    let none = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
-    let mut out = vec![none; count as usize];
-    for (t, &tag) in bosses.surface.tags.iter().enumerate() {
-        let (lo, hi) = &mut out[tag as usize];
-        for p in bosses.surface.corners(t) {
-            *lo = lo.inf(&p);
-            *hi = hi.sup(&p);
-        }
-    }
-    out.extend(bosses.free.iter().map(|bore| {
-        let by = Vec3::repeat(bore.radius);
-        (bore.a.inf(&bore.b) - by, bore.a.sup(&bore.b) + by)
-    }));
-    out
 }
 
 /// The field with room for the bodies and a margin around them.

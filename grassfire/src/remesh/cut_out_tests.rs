@@ -1,6 +1,6 @@
 //! Eyes on a bar, cut out.
 
-use super::super::extract;
+use super::super::{Capsule, extract};
 use super::*;
 use crate::mesh::Solid;
 
@@ -77,14 +77,17 @@ fn bosses() -> Bosses {
 }
 
 fn cut(proposal: &Remeshed) -> DesignPart {
-    cut_out(
-        proposal,
-        &bosses(),
-        &CutOutOptions::default(),
-        &Monitor::default(),
-    )
-    .expect("no error")
-    .expect("something left")
+    cut_with(proposal, None)
+}
+
+fn cut_with(proposal: &Remeshed, wedge: Option<f64>) -> DesignPart {
+    let options = CutOutOptions {
+        wedge,
+        ..CutOutOptions::default()
+    };
+    cut_out(proposal, &bosses(), &options, &Monitor::default())
+        .expect("no error")
+        .expect("something left")
 }
 
 /// Extent of the material at `y = 0`, height `z`.
@@ -131,6 +134,35 @@ fn slices_beside_bodies_stayed_at_a_finer_voxel_than_the_default() {
     proposal.grain = 1.6;
     // What is left runs on into the walls, which end at 8 mm.
     assert!(highest(&proposal) < 8.0);
+}
+
+#[test]
+fn wedges_beside_bodies_were_cut_off_with_a_step() {
+    // A bar higher than the eyes, which runs out over their end faces as wedges.
+    let mut wedged = proposal(0.0, 2.0);
+    // The thicknesses that decide are three and two voxels thick.
+    wedged.grain = 1.6;
+    for v in 0..wedged.field.values.len() {
+        let [i, j, k] = wedged.field.ijk(v);
+        let p = wedged.field.centre(i, j, k);
+        let slope = 0.7 * (26.0 - p.x.abs());
+        let wall = (HEIGHT + slope.min(3.5) - p.z.abs())
+            .min(26.0 - p.x.abs())
+            .min(3.0 - p.y.abs());
+        let outside = EYES.map(|x| (p - Vec3::new(x, 0.0, p.z)).norm() - BORE);
+        let wall = wall.min(outside[0]).min(outside[1]);
+        wedged.field.values[v] = wedged.field.values[v].max(wall as f32);
+    }
+    let lost = [None, Some(0.3)].map(|wedge| {
+        let design = cut_with(&wedged, wedge);
+        assert_eq!(design.united, design.wanted);
+        design.lost
+    });
+    assert!(lost[1] < 0.75 * lost[0] && lost[0] > 0.0, "{lost:?}");
+    // Shells of the eyes' walls still go.
+    let design = cut_with(&proposal(0.7, 2.0), Some(0.3));
+    let highest = design.part.solid.mesh().points.iter().map(|p| p.y.abs());
+    assert!(highest.fold(0.0, f64::max) < 4.0);
 }
 
 #[test]

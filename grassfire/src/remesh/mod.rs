@@ -1,5 +1,6 @@
 //! Voxel remesh: soup in, closed solid and signed distance field out, topological noise removed.
 
+mod bosses;
 mod bridges;
 mod cases;
 mod closing;
@@ -27,7 +28,8 @@ mod tunnels;
 mod vanished;
 mod wrap;
 
-pub use cut_out::{Bosses, CutOutOptions, DesignPart, cut_out};
+pub use bosses::Bosses;
+pub use cut_out::{CutOutOptions, DesignPart, cut_out};
 pub use drawn::{Draw, drawn_surface};
 pub use error::RemeshError;
 pub use options::{Capsule, RemeshOptions};

@@ -222,6 +222,8 @@ pub struct SkeletonBlock {
     /// Why these were given up for the usual ones; none when they were not tried.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steady_refused: Option<String>,
+    /// Of a design part that keeps the tips of its wedges beside non-design bodies, `retry.wedge`.
+    pub wedges: bool,
     /// Quads.
     pub quads: usize,
     /// Edges without quads.

@@ -301,6 +301,14 @@ fn agreement(equal: bool) -> Markup {
     html! { @if equal { span .pill.good { "equal" } } @else { span .pill.bad { "differs" } } }
 }
 
+fn limits(block: &SkeletonBlock) -> &'static str {
+    match (block.steady, block.wedges) {
+        (true, true) => "steady, tips of wedges kept",
+        (true, false) => "steady",
+        (false, _) => "usual",
+    }
+}
+
 fn skeleton(block: &SkeletonBlock) -> Markup {
     html! {
         h2 { "Skeleton" }
@@ -312,7 +320,7 @@ fn skeleton(block: &SkeletonBlock) -> Markup {
         }
         (pairs(&[
             ("Layout", block.layout.clone()),
-            ("Limits", if block.steady { "steady" } else { "usual" }.to_owned()),
+            ("Limits", limits(block).to_owned()),
             ("Quads", count(block.quads)),
             ("Beams", count(block.beams)),
             ("Sheets", count(block.sheets)),
