@@ -115,28 +115,46 @@ pub fn dexels_on(mesh: &TriMesh, lattice: &Lattice) -> Dexels {
     for triangle in &mesh.triangles {
         draw(triangle, &points, origin, pitch, dims, &mut hits);
     }
-    hits.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(b.2.cmp(&a.2)));
+    let lines = dims[0] * dims[1];
+    let (start, hits) = by_line(&hits, lines);
     let mut out = Dexels {
         dims,
         pitch,
         axes,
         origin,
-        start: Vec::with_capacity(dims[0] * dims[1] + 1),
+        start: Vec::with_capacity(lines + 1),
         intervals: Vec::new(),
     };
     let size = mesh.bounds().map_or(0.0, |(lo, hi)| (hi - lo).norm());
     let least = ROUNDING * size;
-    let mut next = 0;
-    for line in 0..(dims[0] * dims[1]) as u32 {
+    let mut on_line: Vec<(f64, i8)> = Vec::new();
+    for line in 0..lines {
         out.start.push(out.intervals.len() as u32);
-        let first = next;
-        while next < hits.len() && hits[next].0 == line {
-            next += 1;
-        }
-        gather(&hits[first..next], least, &mut out.intervals);
+        on_line.clear();
+        on_line.extend_from_slice(&hits[start[line] as usize..start[line + 1] as usize]);
+        on_line.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+        gather(&on_line, least, &mut out.intervals);
     }
     out.start.push(out.intervals.len() as u32);
     out
+}
+
+/// Hits in the order of their lines, and where those of each line begin, and the end.
+fn by_line(hits: &[(u32, f64, i8)], lines: usize) -> (Vec<u32>, Vec<(f64, i8)>) {
+    let mut start = vec![0_u32; lines + 1];
+    for hit in hits {
+        start[hit.0 as usize + 1] += 1;
+    }
+    for line in 0..lines {
+        start[line + 1] += start[line];
+    }
+    let (mut next, mut out) = (start.clone(), vec![(0.0, 0); hits.len()]);
+    for &(line, z, step) in hits {
+        let at = &mut next[line as usize];
+        out[*at as usize] = (z, step);
+        *at += 1;
+    }
+    (start, out)
 }
 
 /// Coordinates of a point on three axes.
@@ -145,11 +163,11 @@ fn along(axes: &[Vec3; 3], p: &Vec3) -> Vec3 {
 }
 
 /// Adds what lies inside along one line.
-fn gather(hits: &[(u32, f64, i8)], least: f64, intervals: &mut Vec<[f64; 2]>) {
+fn gather(hits: &[(f64, i8)], least: f64, intervals: &mut Vec<[f64; 2]>) {
     let first = intervals.len();
     let mut depth = 0_i32;
     let mut begin = 0.0;
-    for &(_, z, step) in hits {
+    for &(z, step) in hits {
         let before = depth;
         depth += i32::from(step);
         if before <= 0 && depth > 0 {

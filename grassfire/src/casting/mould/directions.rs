@@ -42,20 +42,23 @@ impl Direction {
 
 /// Lines along the longer side in the first round.
 const COARSE: usize = 96;
-/// This many of the best are looked at closely.
-const KEPT: usize = 48;
-/// This many of those are turned: the best, and each that lies more than [`APART`] from better ones.
-const FOLLOWED: usize = 8;
-/// Cosine of 10 degrees.
-const APART: f64 = 0.985;
-/// This many of the best are judged at last on [`FINER`] times as many lines.
-const LAST: usize = 12;
+/// Cosine of 5 degrees: starts of descents lie farther apart.
+const APART: f64 = 0.996;
+/// Descents from directions of the first round.
+const FOLLOWED: usize = 24;
+/// Descents on the finest lattice.
+const LAST: usize = 8;
+/// Descents there by undercut alone.
+const LEAST: usize = 4;
+/// No descent on the finest lattice starts where this share of the part's volume more is undercut than at the best: a degree does not
+/// bring so much.
+const HOPELESS: f64 = 0.01;
 /// Lines know an undercut the better the more they are: see [`allowed`].
 pub const FINER: usize = 4;
-/// Turns tried around the best, degrees.
+/// Steps of a descent, degrees.
 const TURNS: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
-/// Those of [`TURNS`] that are tried again on the finest lattice.
-const LAST_TURNS: usize = 2;
+/// The same on the finest lattice.
+const LAST_TURNS: [f64; 3] = [1.0, 0.5, 0.25];
 /// Undercuts below this share of the part's volume are the lattice's.
 pub const SLACK: f64 = 2e-4;
 
@@ -63,8 +66,10 @@ pub const SLACK: f64 = 2e-4;
 ///
 /// 1. `count` directions spread evenly over a half-space (a Fibonacci spiral), the axes and the normals that much area
 ///    shares, on a coarse lattice.
-/// 2. The best of these on `lines` lines; the best few that lie apart are turned by smaller and smaller angles as long as that helps.
-/// 3. What these gave and the best as they were on [`FINER`] times as many lines; the best is turned a little there.
+/// 2. Descents on `lines` lines from the best of these that lie apart: a direction is turned by smaller and smaller angles as long as
+///    that helps.
+/// 3. Descents on [`FINER`] times as many lines from the best ends of these that lie apart: some by undercut alone, because the least
+///    undercut decides what counts as equal, then some by all. The best that was seen there is taken.
 ///
 /// O(directions * triangles); the result does not depend on the number of threads.
 ///
@@ -77,30 +82,47 @@ pub fn best_direction(
     draft: f64,
     monitor: &Monitor,
 ) -> Result<Direction, Cancelled> {
-    let search = Search {
+    let search = |lines| Search {
         mesh,
         draft,
         monitor,
+        lines,
+        seen: Vec::new(),
     };
+    let draws = |list: &[Direction]| list.iter().map(|d| d.draw).collect::<Vec<_>>();
     let mut marked = vec![Vec3::x(), Vec3::y(), Vec3::z()];
     marked.extend(shared_normals(mesh));
-    let spread = search.look(&spiral(count), lines.min(COARSE))?;
-    let mut kept = marked.clone();
-    kept.extend(best_of(&spread, 0.0, KEPT).iter().map(|d| d.draw));
-    let seen = search.look(&kept, lines)?;
-    let equal = allowed(&seen, mesh, lines);
-    let seen = best_of(&seen, equal, seen.len());
-    let mut last = marked;
-    last.extend(seen.iter().take(LAST).map(|d| d.draw));
-    let near = |a: &Direction, b: &Direction| a.draw.dot(&b.draw).abs() > APART;
-    for start in apart(seen, FOLLOWED, near) {
-        last.push(search.turned(start, &TURNS, lines, equal)?.draw);
+    let mut coarse = search(lines.min(COARSE));
+    coarse.look(&spiral(count))?;
+    let mut usual = search(lines);
+    usual.look(&marked)?;
+    usual.look(&draws(&coarse.best_apart(FOLLOWED, Goal::All)))?;
+    for start in usual.best_apart(FOLLOWED, Goal::All) {
+        usual.descend(start, &TURNS, Goal::All)?;
     }
-    let lines = FINER * lines;
-    let seen = search.look(&last, lines)?;
-    let equal = allowed(&seen, mesh, lines);
-    let best = best_of(&seen, equal, 1)[0];
-    search.turned(best, &TURNS[TURNS.len() - LAST_TURNS..], lines, equal)
+    let mut fine = search(FINER * lines);
+    fine.look(&marked)?;
+    for goal in [Goal::Undercut, Goal::All] {
+        fine.look(&draws(&usual.best_apart(2 * LAST, goal)))?;
+    }
+    for (goal, most) in [(Goal::Undercut, LEAST), (Goal::All, LAST)] {
+        let hopeless = fine.equal(Goal::All) + HOPELESS * mesh.volume().abs();
+        for start in fine.best_apart(most, goal) {
+            if start.undercut <= hopeless {
+                fine.descend(start, &LAST_TURNS, goal)?;
+            }
+        }
+    }
+    Ok(fine.best_apart(1, Goal::All)[0])
+}
+
+/// What a descent is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Goal {
+    /// The least undercut, whatever else.
+    Undercut,
+    /// All that counts, in its order.
+    All,
 }
 
 /// Undercuts up to this, mm3, are as good as the least of all when seen with so many lines.
@@ -124,32 +146,47 @@ pub fn best_of(list: &[Direction], equal: f64, most: usize) -> Vec<Direction> {
     out
 }
 
-/// What directions are judged by.
+/// Directions judged on one lattice.
 struct Search<'a> {
     mesh: &'a TriMesh,
     /// Degrees.
     draft: f64,
     monitor: &'a Monitor,
+    lines: usize,
+    /// All that were judged.
+    seen: Vec<Direction>,
 }
 
 impl Search<'_> {
-    /// All of them, in their order.
-    fn look(&self, draws: &[Vec3], lines: usize) -> Result<Vec<Direction>, Cancelled> {
-        let seen = draws.par_iter().map(|draw| {
+    /// Judges these.
+    fn look(&mut self, draws: &[Vec3]) -> Result<&[Direction], Cancelled> {
+        let looked = draws.par_iter().map(|draw| {
             self.monitor.check()?;
-            Ok(judge(self.mesh, draw, lines, self.draft))
+            Ok(judge(self.mesh, draw, self.lines, self.draft))
         });
-        seen.collect()
+        let looked = looked.collect::<Result<Vec<_>, _>>()?;
+        let first = self.seen.len();
+        self.seen.extend(looked);
+        Ok(&self.seen[first..])
     }
 
-    /// The direction turned by each of `turns` (degrees) as long as that helps, when undercuts up to `equal` mm3 count as equal.
-    fn turned(
-        &self,
-        start: Direction,
-        turns: &[f64],
-        lines: usize,
-        equal: f64,
-    ) -> Result<Direction, Cancelled> {
+    /// Undercuts that count as equal so far, mm3.
+    fn equal(&self, goal: Goal) -> f64 {
+        match goal {
+            Goal::Undercut => 0.0,
+            Goal::All => allowed(&self.seen, self.mesh, self.lines),
+        }
+    }
+
+    /// The best so far, of which each lies apart from better ones; best first.
+    fn best_apart(&self, most: usize, goal: Goal) -> Vec<Direction> {
+        let all = best_of(&self.seen, self.equal(goal), self.seen.len());
+        let near = |a: &Direction, b: &Direction| a.draw.dot(&b.draw).abs() > APART;
+        apart(all, most, near)
+    }
+
+    /// Turns a direction by each of `turns` (degrees) as long as that helps.
+    fn descend(&mut self, start: Direction, turns: &[f64], goal: Goal) -> Result<(), Cancelled> {
         let mut best = start;
         for turn in turns {
             loop {
@@ -159,14 +196,16 @@ impl Search<'_> {
                     .iter()
                     .map(|t| (best.draw + tilt * t).normalize())
                     .collect();
-                let next = best_of(&self.look(&around, lines)?, equal, 1)[0];
+                let looked = self.look(&around)?.to_vec();
+                let equal = self.equal(goal);
+                let next = best_of(&looked, equal, 1)[0];
                 if next.compare(&best, equal) != Ordering::Less {
                     break;
                 }
                 best = next;
             }
         }
-        Ok(best)
+        Ok(())
     }
 }
 

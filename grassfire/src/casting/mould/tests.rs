@@ -71,6 +71,32 @@ fn the_best_direction_of_a_beam_is_across() {
     assert!(found.undercuts.is_empty());
 }
 
+/// On a strap the search stopped 55 degrees away from a direction with less undercut, whose low is a few degrees wide.
+#[test]
+fn no_direction_of_a_finer_spread_is_better_than_the_best() {
+    use super::directions::{FINER, allowed, best_of, judge, spiral};
+    // A block with deep slanted slots between its plates: each way out of one of them is narrow.
+    let mut mesh = TriMesh::default();
+    for k in 0..6 {
+        let turn = nalgebra::Rotation3::from_euler_angles(0.35, 0.1 * f64::from(k), 0.7);
+        let at = 7.0 * f64::from(k);
+        let mut plate = boxes(&[[at, 0.0, 0.0, at + 4.0, 40.0, 60.0]]);
+        plate.points.iter_mut().for_each(|p| *p = turn * *p);
+        mesh.append(plate.points, plate.triangles);
+    }
+    let (lines, draft) = (16, 1.0);
+    let found = best_direction(&mesh, 60, lines, draft, &Monitor::default()).expect("in time");
+    let spread = spiral(1500);
+    let seen = spread
+        .iter()
+        .map(|draw| judge(&mesh, draw, FINER * lines, draft));
+    let mut seen: Vec<Direction> = seen.collect();
+    seen.push(found);
+    let equal = allowed(&seen, &mesh, FINER * lines);
+    let best = best_of(&seen, equal, 1)[0];
+    assert_eq!(best, found, "{best:?} is better than {found:?}");
+}
+
 #[test]
 fn draft_of_a_wedge_is_known() {
     // A truncated pyramid with sides at 5 degrees.
