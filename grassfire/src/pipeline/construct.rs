@@ -179,7 +179,6 @@ impl<'a> Site<'a> {
             self.monitor.keep_warnings(told);
             if self.steady.take().is_some() {
                 self.steady_refused = refused;
-                self.wedges = false;
             } else {
                 self.layout = Layout::Plain;
                 self.regular_refused = refused;

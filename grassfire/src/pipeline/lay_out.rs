@@ -29,6 +29,7 @@ impl Site<'_> {
     /// Medial axis and fitted body: of steady limits when that is close, on the design part or on one with its wedges, which comes with
     /// them then; else of the usual ones when that is good. What was given up is not tried again.
     pub(super) fn laid_out(&mut self, base: &Base) -> Result<LaidOut, PipelineError> {
+        self.wedges = false;
         let Some(options) = self.steady.clone() else {
             let (axis, tried) = self.usual(base)?;
             return Ok((axis, tried?.1, None));

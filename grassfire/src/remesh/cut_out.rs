@@ -105,6 +105,32 @@ impl Lengths {
     }
 }
 
+/// Balls larger than this, voxels, take minutes.
+const MOST: f64 = 20.0;
+
+fn check(options: &CutOutOptions) -> Result<(), RemeshError> {
+    let lengths = [
+        ("skin", options.skin),
+        ("least_half_thickness", options.least_half_thickness),
+        ("wedge", options.wedge.unwrap_or(0.0)),
+        ("wedge_reach", options.wedge_reach),
+        ("run_on", options.run_on),
+        ("clearance", options.clearance),
+        ("slot", options.slot),
+        ("island", options.island),
+        ("noise", options.noise),
+    ];
+    let bad = |(_, value): &&(_, f64)| !(0.0..=MOST).contains(value);
+    match lengths.iter().find(bad) {
+        Some(&(name, value)) => Err(RemeshError::BadCutOut {
+            name,
+            value,
+            most: MOST,
+        }),
+        None => Ok(()),
+    }
+}
+
 /// Balls about voxel centres do not quite cover what they should: so much is forgiven, voxels.
 const FORGIVEN: f64 = 0.4;
 /// Empty voxels around everything.
@@ -123,13 +149,14 @@ const MARGIN: usize = 3;
 /// every number of threads.
 ///
 /// # Errors
-/// [`RemeshError::Surface`], [`RemeshError::Topology`], cancelled.
+/// [`RemeshError::BadCutOut`], [`RemeshError::Surface`], [`RemeshError::Topology`], cancelled.
 pub fn cut_out(
     proposal: &Remeshed,
     bosses: &Bosses,
     options: &CutOutOptions,
     monitor: &Monitor,
 ) -> Result<Option<DesignPart>, RemeshError> {
+    check(options)?;
     let Some((lo, hi)) = bosses.surface.bounds() else {
         return Ok(None);
     };

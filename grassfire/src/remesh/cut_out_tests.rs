@@ -174,6 +174,26 @@ fn under_open_end_faces_the_bar_dives() {
 }
 
 #[test]
+fn lengths_that_make_no_sense_are_refused() {
+    for value in [1000.0, -1.0, f64::NAN] {
+        let options = CutOutOptions {
+            run_on: value,
+            ..CutOutOptions::default()
+        };
+        let part = cut_out(
+            &proposal(0.0, 2.0),
+            &bosses(),
+            &options,
+            &Monitor::default(),
+        );
+        assert!(matches!(
+            part,
+            Err(RemeshError::BadCutOut { name: "run_on", .. })
+        ));
+    }
+}
+
+#[test]
 fn without_bodies_there_is_nothing_to_cut_out() {
     let (options, monitor) = (CutOutOptions::default(), Monitor::default());
     let part = cut_out(&proposal(0.0, 2.0), &Bosses::default(), &options, &monitor);

@@ -43,6 +43,16 @@ pub enum RemeshError {
         /// What it should be.
         wanted: &'static str,
     },
+    /// An option of [`super::CutOutOptions`] makes no sense.
+    #[error("cut_out.{name} is {value} voxels, 0 to {most} are wanted")]
+    BadCutOut {
+        /// Its name.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The largest that is allowed.
+        most: f64,
+    },
     /// A density grid whose parts do not fit together.
     #[error(
         "the density grid is {dims:?} with {values} values and spacing {spacing} mm; at least 2 voxels a side, one value a voxel and a positive spacing are wanted"
@@ -108,7 +118,10 @@ impl RemeshError {
             Self::Topology { .. } | Self::Surface(_) => {
                 Some("try a slightly different remesh.voxel".into())
             }
-            Self::BadOption { .. } | Self::BadGrid { .. } | Self::Cancelled(_) => None,
+            Self::BadOption { .. }
+            | Self::BadCutOut { .. }
+            | Self::BadGrid { .. }
+            | Self::Cancelled(_) => None,
         }
     }
 }
