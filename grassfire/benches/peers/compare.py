@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Quads of grassfire, Instant Meshes and QuadriFlow on the same surface and with the same number of quads, in one run.
 
-    compare.py GRASSFIRE PART...
+    compare.py GRASSFIRE FACES PART...
 
 Each part goes through `grassfire reconstruct`. The others get the very surface that our body follows (design_part.stl or,
 where no bodies were cut out, proposal.stl), and our number of quads. Our control points count at their places on the limit
 surface, and the quads of all three as flat pieces: quads, vertices whose valence is not four, deviation of corners from a
-right angle, two-sided distance to the surface in voxels, processor seconds (ours: the whole chain with its CAD solid).
+right angle, two-sided distance to the surface in voxels, faces that our spline stage makes of them (FACES, the example of that
+name; before the union with non-design bodies), processor seconds (ours: the whole chain with its CAD solid).
 """
 import json
 import multiprocessing
@@ -151,7 +152,18 @@ def distances(queries, triangles):
     return np.where(inside, np.minimum(height, least), least).min(1)
 
 
-def row(part, name, points, faces, surface, voxel, seconds):
+def cad_faces(program, points, faces):
+    """Faces of the CAD solid that these quads give."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "quads.obj")
+        with open(path, "w") as out:
+            out.writelines(f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in points)
+            out.writelines("f " + " ".join(str(v + 1) for v in face) + "\n" for face in faces)
+        done = subprocess.run([program, path], check=False, capture_output=True, text=True, timeout=900)
+    return done.stdout.strip() or "none"
+
+
+def row(part, name, points, faces, surface, voxel, cad, seconds):
     valence = defaultdict(int)
     deviation = []
     for face in faces:
@@ -167,15 +179,15 @@ def row(part, name, points, faces, surface, voxel, seconds):
     others = sum(len(face) != 4 for face in faces)
     print(f"| {part} | {name} | {len(faces) - others} | {others} | {irregular} | {np.mean(deviation):.1f} "
           f"| {np.percentile(deviation, 95):.1f} | {np.sqrt(np.mean(off**2)):.2f} | {np.percentile(off, 95):.2f} "
-          f"| {off.max():.1f} | {seconds:.1f} |", flush=True)
+          f"| {off.max():.1f} | {cad} | {seconds:.1f} |", flush=True)
 
 
-def compare(program, part):
+def compare(program, faces, part):
     name = os.path.splitext(os.path.basename(part))[0]
     with tempfile.TemporaryDirectory() as out:
         seconds = ours(program, part, out)
         if not os.path.exists(os.path.join(out, "body.obj")):
-            print(f"| {name} | grassfire | no body | | | | | | | | |")
+            print(f"| {name} | grassfire | no body | | | | | | | | | |")
             return
         with open(os.path.join(out, "report.json")) as f:
             voxel = json.load(f)["remesh"]["voxel"]
@@ -183,20 +195,22 @@ def compare(program, part):
         points, triangles = read_stl(design if os.path.exists(design) else os.path.join(out, "proposal.stl"))
         control, quads = read_obj(os.path.join(out, "body.obj"))
     surface = points[triangles]
-    row(name, "grassfire", limit_points(control, quads), quads, surface, voxel, seconds)
+    cad = cad_faces(faces, control, quads)
+    row(name, "grassfire", limit_points(control, quads), quads, surface, voxel, cad, seconds)
     for other in ("Instant Meshes", "QuadriFlow"):
         answer = in_its_own_process(other, points, triangles, len(quads))
         if isinstance(answer, str):
-            print(f"| {name} | {other} | {answer} | | | | | | | | |", flush=True)
+            print(f"| {name} | {other} | {answer} | | | | | | | | | |", flush=True)
         else:
-            row(name, other, answer[0], answer[1], surface, voxel, answer[2])
+            cad = cad_faces(faces, answer[0], answer[1])
+            row(name, other, answer[0], answer[1], surface, voxel, cad, answer[2])
 
 
 def main():
-    print("| part | program | quads | other faces | irregular vertices | corners, mean | p95 | rms | p95 | max | CPU s |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|")
-    for part in sys.argv[2:]:
-        compare(sys.argv[1], part)
+    print("| part | program | quads | other faces | irregular vertices | corners, mean | p95 | rms | p95 | max | CAD faces | CPU s |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|")
+    for part in sys.argv[3:]:
+        compare(sys.argv[1], sys.argv[2], part)
 
 
 main()

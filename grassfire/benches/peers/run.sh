@@ -20,4 +20,5 @@ if [ $# -eq 0 ]; then
 fi
 cd "$root"
 cargo build --release --locked -p grassfire-cli
-"$build/peers/bin/python" "$here/compare.py" "$build/release/grassfire" "$@"
+cargo build --release --locked -p grassfire --example faces
+"$build/peers/bin/python" "$here/compare.py" "$build/release/grassfire" "$build/release/examples/faces" "$@"
