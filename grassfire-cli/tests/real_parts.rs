@@ -92,7 +92,7 @@ fn simjeb_055_becomes_a_good_solid() {
 
 #[test]
 fn simjeb_398_becomes_a_good_solid() {
-    bracket("simjeb_398.obj", 7, 2.0);
+    bracket("simjeb_398.obj", 7, 1.5);
 }
 
 #[test]
