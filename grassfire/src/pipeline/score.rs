@@ -147,7 +147,7 @@ impl Score {
                 || farther(self.farthest, other.farthest, NEAR));
         refused.then(|| {
             let (distances, rough, farthest) = (self.distances(), other.rough, other.farthest);
-            format!("{distances}, that of the plain one {rough:.2} and {farthest:.1}")
+            format!("{distances}, that of the other one {rough:.2} and {farthest:.1}")
         })
     }
 
