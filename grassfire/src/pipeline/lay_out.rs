@@ -6,6 +6,7 @@ use super::design::Design;
 use super::error::PipelineError;
 use super::score::{SAME, Score};
 use super::shape::{self, Base, Shape, Tried};
+use crate::fit::FitOptions;
 use crate::medial::{self, MedialAxis};
 use crate::remesh::CutOutOptions;
 use crate::skeleton::Layout;
@@ -42,7 +43,7 @@ impl Site<'_> {
         }
         // What went wrong is said once, in the reason.
         monitor.keep_warnings(told);
-        // Cut-off wedges are far off at single places.
+        // Wedges are cut off in steps of less than two voxels: what is torn is so for another reason.
         let close_else = |(score, _): &(Score, Shape)| score.close_on_the_whole(STEADY_CLOSE);
         if first.as_ref().is_ok_and(close_else) {
             if let Some(laid_out) = self.wedged(base, &options)? {
@@ -92,7 +93,10 @@ impl Site<'_> {
         let Ok(design) = self.design(&cut_out)? else {
             return Ok(None);
         };
-        let (axis, first) = self.first(&design.base(), options)?;
+        // Most parts that are far off somewhere are so for other reasons: a third start would cost too much.
+        let mut options = options.clone();
+        options.fit.starts = options.fit.starts.min(FitOptions::default().starts);
+        let (axis, first) = self.first(&design.base(), &options)?;
         // The usual limits are still left.
         if !taken(&first, 1.0) {
             return Ok(None);

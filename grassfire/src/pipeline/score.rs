@@ -48,6 +48,9 @@ pub(super) const FINE: f64 = 0.75;
 /// A regular layout whose body is within this of the proposal everywhere is taken without making another one, voxels.
 const NEAR: f64 = 1.5;
 
+/// A body is farther off than this, voxels, for another reason than a wedge that was cut off: those end in steps of 1.7.
+const STEP: f64 = 2.5;
+
 /// Distances of two fits that differ by less are the same.
 pub(super) const SAME: f64 = 1.1;
 
@@ -116,9 +119,9 @@ impl Score {
         self.good() && self.rough <= close && self.farthest <= NEAR
     }
 
-    /// Sound and close on the whole, if not at some place.
+    /// Good and close on the whole, if not at some place; not farther there than where a wedge was cut off.
     pub(super) fn close_on_the_whole(&self, close: f64) -> bool {
-        self.sound() && self.excess <= 1.0 && self.rough <= close
+        self.good() && self.rough <= close && self.farthest <= STEP
     }
 
     /// Close, the floors of narrow grooves measured to what is nearest, and `slack` times as far let pass there; the fit's own
