@@ -94,7 +94,8 @@ impl<'a> Site<'a> {
     /// 2. When that gives no sound body or no valid union with the proposal's topology, or there are no bodies, the
     ///    proposal is made as a whole; the body ends inside the walls of given bodies then. Recognised ones are left out
     ///    when no union with them is valid.
-    /// 3. Either is tried with steady limits of the skeleton first, once, then with the regular layout of quads, once, and with the
+    /// 3. Either is tried with steady limits of the skeleton first, once (and once more with the tips of wedges beside the bodies, where
+    ///    those may be what is missing), then with the regular layout of quads, once, and with the
     ///    plain one when those parts are refused.
     /// 4. Where flat faces could not be cut plane, all is made once more without their bulge.
     pub(super) fn build(&mut self) -> Result<Made, PipelineError> {

@@ -177,22 +177,10 @@ pub(super) fn keep_free(field: &mut VoxelGrid<f32>, free: &[Capsule]) {
     for v in 0..field.values.len() {
         let [i, j, k] = field.ijk(v);
         let p = field.centre(i, j, k);
-        let depth = free.iter().map(|bore| depth_in(bore, &p));
+        let depth = free.iter().map(|bore| bore.depth_in_cylinder(&p));
         let depth = depth.fold(f64::NEG_INFINITY, f64::max);
         field.values[v] = f64::from(field.values[v]).min(-depth) as f32;
     }
-}
-
-/// Depth in the cylinder of a bore, mm, negative outside.
-fn depth_in(bore: &Capsule, p: &Vec3) -> f64 {
-    let axis = bore.b - bore.a;
-    let length = axis.norm();
-    if length <= 0.0 {
-        return f64::NEG_INFINITY;
-    }
-    let along = (p - bore.a).dot(&axis) / length;
-    let radial = (p - bore.a - axis * (along / length)).norm();
-    (bore.radius - radial).min(along).min(length - along)
 }
 
 /// The solid of a signed distance field.

@@ -48,15 +48,3 @@ impl Bosses {
         out
     }
 }
-
-/// Depth in a finite cylinder, mm, negative outside.
-pub(super) fn in_bore(bore: &Capsule, p: &Vec3) -> f64 {
-    let axis = bore.b - bore.a;
-    let length = axis.norm();
-    if length <= 0.0 {
-        return f64::NEG_INFINITY;
-    }
-    let along = (p - bore.a).dot(&axis) / length;
-    let radial = (p - bore.a - axis * (along / length)).norm();
-    (bore.radius - radial).min(along).min(length - along)
-}

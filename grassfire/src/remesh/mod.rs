@@ -1,5 +1,6 @@
 //! Voxel remesh: soup in, closed solid and signed distance field out, topological noise removed.
 
+mod ball;
 mod bosses;
 mod bridges;
 mod cases;

@@ -31,6 +31,18 @@ impl Capsule {
         };
         (p - (self.a + axis * t)).norm_squared() <= self.radius * self.radius
     }
+
+    /// Depth of `p` in the cylinder about `a`-`b`, without the round ends, mm; negative outside.
+    pub fn depth_in_cylinder(&self, p: &Vec3) -> f64 {
+        let axis = self.b - self.a;
+        let length = axis.norm();
+        if length <= 0.0 {
+            return f64::NEG_INFINITY;
+        }
+        let along = (p - self.a).dot(&axis) / length;
+        let radial = (p - self.a - axis * (along / length)).norm();
+        (self.radius - radial).min(along).min(length - along)
+    }
 }
 
 /// Options of [`super::remesh`] and [`super::remesh_density`].

@@ -101,10 +101,16 @@ pub fn best_direction(
         usual.descend(start, &TURNS, Goal::All)?;
     }
     let mut fine = search(FINER * lines);
-    fine.look(&marked)?;
+    // Most are in more than one of the lists, and lines are dear here.
+    let mut starts = marked;
     for goal in [Goal::Undercut, Goal::All] {
-        fine.look(&draws(&usual.best_apart(2 * LAST, goal)))?;
+        for draw in draws(&usual.best_apart(2 * LAST, goal)) {
+            if !starts.contains(&draw) {
+                starts.push(draw);
+            }
+        }
     }
+    fine.look(&starts)?;
     for (goal, most) in [(Goal::Undercut, LEAST), (Goal::All, LAST)] {
         let hopeless = fine.equal(Goal::All) + HOPELESS * mesh.volume().abs();
         for start in fine.best_apart(most, goal) {
