@@ -5,7 +5,7 @@ mod support;
 use std::time::Duration;
 
 use serde_json::Value;
-use support::{HOLE, SIDE, THICK, finish, number, plate, run_plate, start};
+use support::{HOLE, SIDE, THICK, finish, number, plate, reconstruct, run_plate, start};
 
 #[test]
 fn plate_becomes_a_good_part() {
@@ -52,6 +52,26 @@ fn the_plain_layout_of_quads_can_be_asked_for() {
     let auto = layout(&[]);
     let refused = auto["regular_refused"].is_string();
     assert_eq!(auto["layout"], if refused { "plain" } else { "regular" });
+}
+
+/// Skeletons changed with every voxel: what was edited before did not fit any more. A finer voxel brings a closer body.
+#[test]
+fn a_voxel_ten_percent_finer_gives_the_same_skeleton() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let part = plate(folder.path());
+    let made = |args: &[&str]| {
+        let run = reconstruct(&part, &folder.path().join("out"), args);
+        assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+        let skeleton = std::fs::read(run.output.join("skeleton.ply")).expect("a skeleton");
+        (run.report(), skeleton)
+    };
+    let (first, skeleton) = made(&[]);
+    let voxel = number(&first, "/distance/voxel");
+    let (finer, same) = made(&["--voxel", &(0.9 * voxel).to_string()]);
+    assert!(same == skeleton, "another skeleton");
+    assert_eq!(number(&finer, "/skeleton/voxel"), voxel);
+    assert!((number(&finer, "/distance/voxel") - 0.9 * voxel).abs() < 1e-9);
+    assert!(number(&finer, "/distance/rms") < 1.1 * number(&first, "/distance/rms"));
 }
 
 /// One corner gets thicker, the far one stays; an edit of a place without skeleton is refused before anything is written.

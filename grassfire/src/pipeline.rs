@@ -235,6 +235,8 @@ fn finish(
 struct Prepared {
     bodies: Bodies,
     remeshed: Remeshed,
+    /// The same at the voxel that its skeleton is made at, when that is coarser and nothing is done to the proposal.
+    coarser: Option<Remeshed>,
     /// What the list of edits made of it, when there is one.
     edited: Option<Remeshed>,
     /// The surface that was read is noise.
@@ -260,13 +262,25 @@ fn prepared(
     record.report.design_space = recognised.faces;
 
     let remeshed = record.stage("remesh", || {
-        inputs::remesh(&proposal, &bodies, options, monitor)
+        inputs::remesh(&proposal, &bodies, options, options.remesh.voxel, monitor)
     })?;
     record.report.remesh = Some(measure::remesh_block(&remeshed));
     let edited = edits::edited(record, &remeshed, &bodies, options, monitor)?;
+    let as_it_is = edited.is_none()
+        && options.mould.repair == Repair::Off
+        && !options.feed.active()
+        && job.skeleton.is_none();
+    let coarser = if as_it_is {
+        record.stage("remesh", || {
+            inputs::coarser(&proposal, &bodies, &remeshed, options, monitor)
+        })?
+    } else {
+        None
+    };
     Ok(Prepared {
         bodies,
         remeshed,
+        coarser,
         edited,
         noisy: proposal.is_noise(),
     })
@@ -302,6 +316,7 @@ fn rebuild(
     let Prepared {
         mut bodies,
         remeshed,
+        coarser,
         edited,
         noisy,
     } = prepared(record, job, monitor)?;
@@ -339,9 +354,11 @@ fn rebuild(
         None => feeding::edit(record, &original, &bodies, options, monitor)?,
     };
     let layout = first_layout(options, noisy);
+    let base = coarser.as_ref().unwrap_or(&original);
     let mut site = Site {
         record,
-        remeshed: &original,
+        remeshed: base,
+        fine: coarser.as_ref().map(|_| &original),
         bodies: &mut bodies,
         drawn: drawn.as_ref(),
         delivery: &delivery,
@@ -365,7 +382,7 @@ fn rebuild(
         part,
         distance,
     } = made;
-    let grown_before = !std::ptr::eq(site.remeshed, &original);
+    let grown_before = !std::ptr::eq(site.remeshed, base);
     let grown = site.grown.take();
     let before = fed.as_ref().filter(|_| grown_before).map(|f| &f.solid);
     let remeshed = grown.as_ref().or(before).unwrap_or(&original);

@@ -1,6 +1,7 @@
 //! One start of the fit: rounds, untangling, refinement, settling.
 
 use super::goal::{Figures, Goal};
+use super::tangles::Tangles;
 use super::targets::IsoSamples;
 use super::{FitError, FitOptions, Fitted, STAGE, refine, round, settle, surface, untangle};
 use crate::Vec3;
@@ -68,32 +69,75 @@ pub(super) fn attempt(
         state = refine::refine(state, skeleton, &mut fitted, options, monitor)?;
         settle::settle(&mut state, &fitted, options, monitor)?;
     }
-    let refine::State {
-        body,
+    monitor.step(STAGE, "distances", 0.97)?;
+    Ok(Attempt::of(state, fitted, options))
+}
+
+/// Steps 4 and 5 of [`super::fit`] alone, of a body that was fitted to another field.
+pub(super) fn settled(
+    fitted: &Fitted,
+    skeleton: &Skeleton,
+    field: &VoxelGrid<f32>,
+    iso: &IsoSamples,
+    iso_volume: f64,
+    options: &FitOptions,
+    monitor: &Monitor,
+) -> Result<Attempt, FitError> {
+    let surface = surface::Surface::new(&fitted.body, field)?;
+    let solver = round::Solver::new(surface, field, iso, options)?;
+    let placed = fitted.mesh.points.iter().map(|p| field.to_grid(p));
+    let points: Vec<Vec3> = placed.collect();
+    let tangles = Tangles::of(&solver, &points);
+    let mut state = refine::State {
+        body: fitted.body.clone(),
         solver,
         points,
         tangles,
-    } = state;
-    fitted.self_intersections = tangles.places(&solver);
-    fitted.folds = tangles.folds(&solver, options.fold_limit);
-    monitor.step(STAGE, "distances", 0.97)?;
-    fitted.body_to_iso = solver.body_to_iso(&points);
-    fitted.iso_to_body = solver.iso_to_body(&points);
-    fitted.farthest = solver
-        .farthest_from_iso(&points)
-        .max(fitted.iso_to_body.max);
-    fitted.volume = solver.surface.volume(&points);
-    fitted.mesh = solver.surface.control_mesh(&points);
-    fitted.body = body;
-    let goal = Goal::of(options);
-    let both = [fitted.body_to_iso, fitted.iso_to_body];
-    let figures = Figures::new(both, fitted.volume / iso_volume, field.spacing);
-    let sound = tangles.sound();
-    Ok(Attempt {
-        met: sound && goal.met(&figures),
-        sound,
-        farthest: figures.farthest(),
-        error: goal.error(&figures),
-        fitted,
-    })
+    };
+    let mut fitted = Fitted {
+        iso_volume,
+        ..fitted.clone()
+    };
+    if state.tangles.sound() {
+        state = refine::refine(state, skeleton, &mut fitted, options, monitor)?;
+        settle::settle(&mut state, &fitted, options, monitor)?;
+    }
+    Ok(Attempt::of(state, fitted, options))
+}
+
+impl Attempt {
+    /// Measures what a start has come to.
+    fn of(state: refine::State, mut fitted: Fitted, options: &FitOptions) -> Self {
+        let refine::State {
+            body,
+            solver,
+            points,
+            tangles,
+        } = state;
+        fitted.self_intersections = tangles.places(&solver);
+        fitted.folds = tangles.folds(&solver, options.fold_limit);
+        fitted.body_to_iso = solver.body_to_iso(&points);
+        fitted.iso_to_body = solver.iso_to_body(&points);
+        fitted.farthest = solver
+            .farthest_from_iso(&points)
+            .max(fitted.iso_to_body.max);
+        fitted.volume = solver.surface.volume(&points);
+        fitted.mesh = solver.surface.control_mesh(&points);
+        fitted.body = body;
+        let goal = Goal::of(options);
+        let both = [fitted.body_to_iso, fitted.iso_to_body];
+        let figures = Figures::new(
+            both,
+            fitted.volume / fitted.iso_volume,
+            solver.field.spacing,
+        );
+        let sound = tangles.sound();
+        Self {
+            met: sound && goal.met(&figures),
+            sound,
+            farthest: figures.farthest(),
+            error: goal.error(&figures),
+            fitted,
+        }
+    }
 }

@@ -49,6 +49,9 @@ const FAR: f64 = 10.0;
 /// Quads of all starts together, at most: large bodies take long, and get fewer starts.
 const MANY_QUADS: usize = 4000;
 
+/// Quads of a body that settles on a finer field, over those it had: a field is finer by less than the square root of 2.
+const MORE: f64 = std::f64::consts::SQRT_2;
+
 /// Options of [`fit`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -351,6 +354,31 @@ pub fn fit(
     Ok(fitted)
 }
 
+/// The last steps of [`fit`] alone: a body that was fitted to a coarser field of the same solid is refined once, by few quads, and
+/// settles on `field`, without a new intersection or fold. A body that has some stays as it is. Figures are those to `field`.
+///
+/// # Errors
+/// As [`fit`].
+pub fn settled(
+    fitted: &Fitted,
+    skeleton: &Skeleton,
+    field: &VoxelGrid<f32>,
+    options: &FitOptions,
+    monitor: &Monitor,
+) -> Result<Fitted, FitError> {
+    check_options(options)?;
+    check_field(field)?;
+    let iso = targets::iso_samples(field, options.iso_samples)?;
+    let iso_volume = options.volume.unwrap_or_else(|| volume(field));
+    let options = FitOptions {
+        refinements: options.refinements.min(1),
+        most_quads: options.most_quads.min(MORE),
+        ..*options
+    };
+    let settled = attempt::settled(fitted, skeleton, field, &iso, iso_volume, &options, monitor)?;
+    Ok(settled.fitted)
+}
+
 fn report(fitted: &Fitted, monitor: &Monitor) {
     for place in &fitted.self_intersections {
         let (p, quads) = (place.place, place.quads.len());
@@ -454,16 +482,7 @@ fn check_input(
     skeleton: &Skeleton,
     field: &VoxelGrid<f32>,
 ) -> Result<(), FitError> {
-    let [nx, ny, nz] = field.dims;
-    let count = nx.checked_mul(ny).and_then(|n| n.checked_mul(nz));
-    let placed = field.spacing > 0.0
-        && field.spacing.is_finite()
-        && field.origin.iter().all(|x| x.is_finite());
-    let finite = field.values.iter().all(|f| f.is_finite());
-    if count != Some(field.values.len()) || field.dims.iter().any(|&n| n < 2) || !placed || !finite
-    {
-        return Err(FitError::BadField { dims: field.dims });
-    }
+    check_field(field)?;
     for (i, p) in body.mesh.points.iter().enumerate() {
         let source = body.source.get(i).copied().unwrap_or(u32::MAX);
         if source as usize >= skeleton.points.len()
@@ -474,6 +493,20 @@ fn check_input(
                 source_point: source,
             });
         }
+    }
+    Ok(())
+}
+
+fn check_field(field: &VoxelGrid<f32>) -> Result<(), FitError> {
+    let [nx, ny, nz] = field.dims;
+    let count = nx.checked_mul(ny).and_then(|n| n.checked_mul(nz));
+    let placed = field.spacing > 0.0
+        && field.spacing.is_finite()
+        && field.origin.iter().all(|x| x.is_finite());
+    let finite = field.values.iter().all(|f| f.is_finite());
+    if count != Some(field.values.len()) || field.dims.iter().any(|&n| n < 2) || !placed || !finite
+    {
+        return Err(FitError::BadField { dims: field.dims });
     }
     Ok(())
 }

@@ -10,13 +10,14 @@ use super::record::Record;
 use super::shape::{self, Base, Shape};
 use super::union::{self, Part};
 use super::{ReconstructOptions, measure};
-use crate::fit::{clear_of, raised};
+use crate::fit::{self, FitOptions, clear_of, raised};
 use crate::medial::MedialAxis;
 use crate::mesh::Distance;
 use crate::monitor::Monitor;
 use crate::remesh::Remeshed;
 use crate::skeleton::{Layout, Skeleton};
 use crate::topology::Betti;
+use crate::voxel::VoxelGrid;
 
 /// Times that a part is made without the bulges of flat faces that could not be cut.
 const FLAT_ROUNDS: usize = 3;
@@ -25,6 +26,8 @@ const FLAT_ROUNDS: usize = 3;
 pub(super) struct Site<'a> {
     pub(super) record: &'a mut Record,
     pub(super) remeshed: &'a Remeshed,
+    /// The same at a finer voxel, which the body follows in the end and is measured against.
+    pub(super) fine: Option<&'a Remeshed>,
     pub(super) bodies: &'a mut Bodies,
     /// A skeleton drawn elsewhere.
     pub(super) drawn: Option<&'a Skeleton>,
@@ -85,7 +88,7 @@ impl<'a> Site<'a> {
 
     /// What the part is measured against.
     pub(super) fn proposal(&self) -> &Remeshed {
-        self.grown.as_ref().unwrap_or(self.remeshed)
+        self.grown.as_ref().or(self.fine).unwrap_or(self.remeshed)
     }
 
     /// Makes the part.
@@ -228,7 +231,7 @@ impl<'a> Site<'a> {
     }
 
     fn distance(&mut self, part: &Part) -> Result<Distance, PipelineError> {
-        let proposal = self.grown.as_ref().unwrap_or(self.remeshed);
+        let proposal = self.grown.as_ref().or(self.fine).unwrap_or(self.remeshed);
         let (bodies, monitor) = (&*self.bodies, self.monitor);
         self.record.stage("measure", || {
             measure::distance(proposal, part, bodies, monitor)
@@ -263,22 +266,27 @@ impl<'a> Site<'a> {
         self.record
             .stage("write", || delivery.remove("design_part.stl"))?;
         let bodies = &*self.bodies;
-        let target = self.record.stage("fit", || {
+        let target = |field: &VoxelGrid<f32>| {
             let depth = options.non_design.clearance * voxel;
             let clear = if bodies.recognised {
                 // They are made from the proposal's own walls, too thin for a body to end inside them.
-                remeshed.field.clone()
+                field.clone()
             } else {
                 // A repair's draft widens the proposal's copies of them.
                 let films = options.mould.leans().is_some();
-                clear_of(&remeshed.field, &bodies.bosses, depth, films)
+                clear_of(field, &bodies.bosses, depth, films)
             };
             let rise = options.flats.raise * voxel;
-            Ok::<_, StageError>(raised(&clear, &bodies.flats, rise).unwrap_or(clear))
+            raised(&clear, &bodies.flats, rise).unwrap_or(clear)
+        };
+        let (coarse, fine) = self.record.stage("fit", || {
+            let fine = self.fine.map(|fine| target(&fine.field));
+            Ok::<_, StageError>((target(&remeshed.field), fine))
         })?;
         let base = Base {
             remeshed,
-            target: &target,
+            target: &coarse,
+            fine: self.fine.zip(fine.as_ref()),
             united: None,
             lost: 0.0,
         };
@@ -327,12 +335,35 @@ impl<'a> Site<'a> {
         }
         let base = &wedged.as_ref().map_or(*base, Design::base);
         self.record.stage("write", || delivery.medial(&axis.mesh))?;
+        let shape = self.settled(shape, base)?;
         let shape = self.fed(shape, base)?;
         let voxel = base.remeshed.field.spacing;
         let shape = fewest(self.record, shape, voxel, options, monitor)?;
         self.record
             .stage("write", || delivery.skeleton(&shape.skeleton.skeleton))?;
         Ok((axis, shape))
+    }
+
+    /// The shape with its body on the fine proposal, if there is one.
+    fn settled(&mut self, shape: Shape, base: &Base) -> Result<Shape, PipelineError> {
+        let (options, monitor) = (&self.options.fit, self.monitor);
+        let Some((_, target)) = base.fine.filter(|_| shape.sound()) else {
+            return Ok(shape);
+        };
+        self.record.stage("fit", || {
+            let options = FitOptions {
+                volume: options.volume.or_else(|| base.fine_volume()),
+                ..*options
+            };
+            let fitted = fit::settled(
+                &shape.fitted,
+                &shape.skeleton.skeleton,
+                target,
+                &options,
+                monitor,
+            )?;
+            Ok::<_, StageError>(Shape { fitted, ..shape })
+        })
     }
 
     /// The shape with sections that grow towards the feeders, as far as its body can follow.
@@ -390,6 +421,7 @@ impl<'a> Site<'a> {
         block.regular_refused.clone_from(&self.regular_refused);
         block.steady = self.steady.is_some();
         block.wedges = self.wedges;
+        block.voxel = self.remeshed.field.spacing;
         block.steady_refused.clone_from(&self.steady_refused);
         report.skeleton = Some(block);
         report.body = Some(measure::body_block(shape));

@@ -2,9 +2,10 @@
 
 use super::construct::Site;
 use super::error::PipelineError;
+use super::follow::same_topology;
 use super::shape::Base;
 use crate::fit::raised;
-use crate::remesh::{CutOutOptions, DesignPart, cut_out};
+use crate::remesh::{CutOutOptions, DesignPart, Remeshed, cut_out};
 use crate::voxel::VoxelGrid;
 
 /// A design part.
@@ -12,6 +13,8 @@ pub(super) struct Design {
     pub(super) cut: DesignPart,
     /// Its field with the bulges of flat faces that are cut later, where there are any.
     raised: Option<VoxelGrid<f32>>,
+    /// Both of the fine proposal, when there is one and the same is left of it.
+    fine: Option<(Remeshed, Option<VoxelGrid<f32>>)>,
 }
 
 impl Design {
@@ -20,6 +23,10 @@ impl Design {
         Base {
             remeshed: part,
             target: self.raised.as_ref().unwrap_or(&part.field),
+            fine: self.fine.as_ref().map(|(part, raised)| {
+                let target = raised.as_ref().unwrap_or(&part.field);
+                (part, target)
+            }),
             united: Some(self.cut.wanted),
             lost: self.cut.lost,
         }
@@ -40,6 +47,13 @@ impl Site<'_> {
         let Some(cut) = design else {
             return Ok(Err("nothing is left of the part".to_owned()));
         };
+        let fine = match self.fine {
+            Some(fine) => self
+                .record
+                .stage("cut_out", || cut_out(fine, bosses, options, monitor))?,
+            None => None,
+        };
+        let fine = fine.filter(|fine| same_topology(&fine.part, &cut.part));
         let (united, wanted) = (cut.united, cut.wanted);
         if united != wanted {
             return Ok(Err(format!(
@@ -48,8 +62,16 @@ impl Site<'_> {
             )));
         }
         let rise = self.options.flats.raise * remeshed.field.spacing;
-        let raised = raised(&cut.part.field, &self.bodies.flats, rise);
-        Ok(Ok(Design { cut, raised }))
+        let raised = |part: &Remeshed| raised(&part.field, &self.bodies.flats, rise);
+        let fine = fine.map(|cut| {
+            let raised = raised(&cut.part);
+            (cut.part, raised)
+        });
+        Ok(Ok(Design {
+            raised: raised(&cut.part),
+            cut,
+            fine,
+        }))
     }
 
     pub(super) fn deliver_design(&mut self, design: &Design) -> Result<(), PipelineError> {

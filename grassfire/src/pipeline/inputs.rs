@@ -6,12 +6,13 @@ use sha2::{Digest, Sha256};
 
 use super::bodies::Bodies;
 use super::error::StageError;
+use super::follow::same_topology;
 use super::{ReconstructJob, ReconstructOptions};
 use crate::Vec3;
 use crate::io::{self, Input, IoError};
 use crate::mesh::{Repair, RepairKind, RepairReport, Repaired, TriMesh, repair};
 use crate::monitor::Monitor;
-use crate::remesh::{Remeshed, remesh_density};
+use crate::remesh::{RemeshOptions, Remeshed, remesh_density, skeleton_voxel};
 use crate::report::{InputBlock, InputFile, RepairEntry};
 use crate::skeleton::{self, Skeleton};
 use crate::voxel::VoxelGrid;
@@ -143,14 +144,18 @@ pub(super) fn skeleton(
     Ok(Some(drawn))
 }
 
-/// Remeshes the proposal; the bores of the non-design bodies stay open.
+/// Remeshes the proposal at a voxel, or at the default one; the bores of the non-design bodies stay open.
 pub(super) fn remesh(
     proposal: &Proposal,
     bodies: &Bodies,
     options: &ReconstructOptions,
+    voxel: Option<f64>,
     monitor: &Monitor,
 ) -> Result<Remeshed, StageError> {
-    let mut remesh_options = options.remesh.clone();
+    let mut remesh_options = RemeshOptions {
+        voxel,
+        ..options.remesh.clone()
+    };
     remesh_options
         .keep_open
         .extend(bodies.bosses.free.iter().copied());
@@ -160,6 +165,32 @@ pub(super) fn remesh(
             remesh_density(grid, options.read.threshold, &remesh_options, monitor)?
         }
     })
+}
+
+/// The proposal at the voxel that its skeleton is made at, where that is coarser than that of `fine` and its topology the same.
+///
+/// # Errors
+/// Cancelled; a coarser grid on which the proposal cannot be remeshed is no error.
+pub(super) fn coarser(
+    proposal: &Proposal,
+    bodies: &Bodies,
+    fine: &Remeshed,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Option<Remeshed>, StageError> {
+    let voxel = skeleton_voxel(fine.field.spacing, fine.default_voxel);
+    if voxel <= fine.field.spacing {
+        return Ok(None);
+    }
+    let told = monitor.warnings().len();
+    let voxel = (voxel < fine.default_voxel).then_some(voxel);
+    let coarse = remesh(proposal, bodies, options, voxel, monitor);
+    // Those of the fine one are told.
+    monitor.keep_warnings(told);
+    monitor.check()?;
+    let coarser = |coarse: &Remeshed| coarse.field.spacing > fine.field.spacing;
+    let kept = coarse.ok().filter(coarser);
+    Ok(kept.filter(|coarse| same_topology(coarse, fine)))
 }
 
 /// Name and SHA-256 of every file that a run reads.

@@ -85,6 +85,8 @@ pub(super) struct Base<'a> {
     pub(super) remeshed: &'a Remeshed,
     /// The field that bodies are fitted to.
     pub(super) target: &'a VoxelGrid<f32>,
+    /// The same of a finer remesh, on which the body settles in the end.
+    pub(super) fine: Option<(&'a Remeshed, &'a VoxelGrid<f32>)>,
     /// The topology of the union, when non-design bodies were cut out.
     pub(super) united: Option<Betti>,
     /// What cutting them out took that they do not give back, mm3.
@@ -95,8 +97,18 @@ impl Base<'_> {
     /// Volume of what bodies are fitted to, mm3: that of the surface, whose edges are sharper than those of its field, what
     /// `target` has more, and what is lost beside non-design bodies: spread over the whole surface it is a hundredth of a voxel.
     pub(super) fn volume(&self, target: &VoxelGrid<f32>) -> f64 {
-        let more = volume(target) - volume(&self.remeshed.field);
-        self.remeshed.solid.volume() + more + self.lost
+        self.volume_of(self.remeshed, target)
+    }
+
+    /// That of the finer remesh.
+    pub(super) fn fine_volume(&self) -> Option<f64> {
+        let (remeshed, target) = self.fine?;
+        Some(self.volume_of(remeshed, target))
+    }
+
+    fn volume_of(&self, remeshed: &Remeshed, target: &VoxelGrid<f32>) -> f64 {
+        let more = volume(target) - volume(&remeshed.field);
+        remeshed.solid.volume() + more + self.lost
     }
 }
 

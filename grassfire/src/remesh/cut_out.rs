@@ -451,6 +451,7 @@ fn solid_of(
         distance_max: proposal.distance_max,
         source: proposal.source,
         grain: proposal.grain,
+        default_voxel: proposal.default_voxel,
     }))
 }
 

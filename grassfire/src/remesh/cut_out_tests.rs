@@ -39,6 +39,7 @@ fn proposal(burr: f64, height: f64) -> Remeshed {
         distance_max: 0.0,
         source: None,
         grain: 0.8,
+        default_voxel: 0.8,
     }
 }
 

@@ -34,7 +34,7 @@ pub use cut_out::{CutOutOptions, DesignPart, cut_out};
 pub use drawn::{Draw, drawn_surface};
 pub use error::RemeshError;
 pub use options::{Capsule, RemeshOptions};
-pub use resolution::default_voxel;
+pub use resolution::{default_voxel, skeleton_voxel};
 pub(crate) use sample::split_long_edges;
 pub use wrap::{WrapOptions, wrap};
 
@@ -94,6 +94,8 @@ pub struct Remeshed {
     pub source: Option<f64>,
     /// Smallest detail that means something, mm: the largest of the voxel, `source` and, where a voxel was asked for, the default one.
     pub grain: f64,
+    /// Voxel that is used when none is asked for, mm.
+    pub default_voxel: f64,
 }
 
 /// Remeshes a triangle soup with good orientation (repaired, but holes, duplicates, overlaps and cracks are allowed).
@@ -237,10 +239,10 @@ fn remesh_on(
         wanted,
     } = sample::sampled(mesh, trusted, options, monitor)?;
     let voxel = field.spacing;
-    let natural = || default_voxel(mesh, options);
-    let grain = voxel
-        .max(source.unwrap_or(0.0))
-        .max(options.voxel.map_or(0.0, |_| natural()));
+    let natural = options
+        .voxel
+        .map_or(voxel, |_| default_voxel(mesh, options));
+    let grain = voxel.max(source.unwrap_or(0.0)).max(natural);
     let width = options.min_tunnel * source.unwrap_or(voxel);
     let input_genus = shells.as_deref().map(input::genus);
     let (vanished, narrow) = vanished(mesh, &field, input_genus, monitor);
@@ -279,6 +281,7 @@ fn remesh_on(
         distance_max,
         source,
         grain,
+        default_voxel: natural,
     })
 }
 

@@ -32,6 +32,19 @@ pub fn default_voxel(mesh: &TriMesh, options: &RemeshOptions) -> f64 {
     voxel_for(mesh, &Bvh::new(mesh), options)
 }
 
+/// The voxel that the skeleton of a part is made at, mm: the finest not below `voxel` on a ladder down from the `default` one, each rung
+/// the square root of 2 below the last. So a voxel a little finer than the default one brings a closer body, but no other skeleton.
+/// Voxels coarser than the default one are taken as they are.
+pub fn skeleton_voxel(voxel: f64, default: f64) -> f64 {
+    // A rung itself is not taken for the next coarser one.
+    let rungs = (2.0 * (default / voxel).log2() + 1e-9).floor();
+    if rungs < 0.0 {
+        voxel
+    } else {
+        default * (-rungs / 2.0).exp2()
+    }
+}
+
 pub(super) fn voxel_for(mesh: &TriMesh, bvh: &Bvh, options: &RemeshOptions) -> f64 {
     let (lo, hi) = bvh.bounds().unwrap_or_default();
     let longest = (hi - lo).max();
@@ -231,5 +244,14 @@ mod tests {
         }
         let found = source_lattice(&mesh).expect("a lattice");
         assert!((found - 1.5).abs() < 0.03, "{found}");
+    }
+
+    #[test]
+    fn skeletons_are_made_on_the_rungs_of_a_ladder() {
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        assert!(near(skeleton_voxel(0.9, 1.0), 1.0) && near(skeleton_voxel(0.71, 1.0), 1.0));
+        assert!(near(skeleton_voxel(0.7, 1.0), 0.5_f64.sqrt()));
+        assert!(near(skeleton_voxel(1.0, 1.0), 1.0) && near(skeleton_voxel(0.5, 1.0), 0.5));
+        assert!(near(skeleton_voxel(1.1, 1.0), 1.1));
     }
 }

@@ -321,6 +321,7 @@ fn skeleton(block: &SkeletonBlock) -> Markup {
         (pairs(&[
             ("Layout", block.layout.clone()),
             ("Limits", limits(block).to_owned()),
+            ("Voxel", with_unit(block.voxel, 3, "mm")),
             ("Quads", count(block.quads)),
             ("Beams", count(block.beams)),
             ("Sheets", count(block.sheets)),
