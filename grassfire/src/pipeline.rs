@@ -33,6 +33,7 @@ mod score;
 mod shape;
 
 mod short_edges;
+mod sizes;
 mod steady;
 mod tetrahedra;
 mod union;
@@ -355,6 +356,7 @@ fn rebuild(
     };
     let layout = first_layout(options, noisy);
     let base = coarser.as_ref().unwrap_or(&original);
+    let usual_sizes = sizes::usual(options).filter(|_| drawn.is_none());
     let mut site = Site {
         record,
         remeshed: base,
@@ -363,10 +365,13 @@ fn rebuild(
         drawn: drawn.as_ref(),
         delivery: &delivery,
         options,
+        usual_sizes: usual_sizes.as_ref(),
+        size_refused: false,
         monitor,
         must_grow: false,
         grown: None,
         layout,
+        first_layout: layout,
         regular_refused: None,
         steady: steady::steady(options).filter(|_| layout == Layout::Auto && drawn.is_none()),
         steady_refused: None,

@@ -33,6 +33,10 @@ pub(super) struct Site<'a> {
     pub(super) drawn: Option<&'a Skeleton>,
     pub(super) delivery: &'a Delivery,
     pub(super) options: &'a ReconstructOptions,
+    /// The same with quads of the default size, when the user chose another: for where that gives no good body.
+    pub(super) usual_sizes: Option<&'a ReconstructOptions>,
+    /// These are in use.
+    pub(super) size_refused: bool,
     pub(super) monitor: &'a Monitor,
     /// A part whose body cannot grow as feeding asks is given up.
     pub(super) must_grow: bool,
@@ -40,6 +44,8 @@ pub(super) struct Site<'a> {
     pub(super) grown: Option<Remeshed>,
     /// Layout of the skeleton's quads; [`Layout::Auto`] until a part of the regular one was given up.
     pub(super) layout: Layout,
+    /// What it was at first.
+    pub(super) first_layout: Layout,
     /// Why it was, if it was.
     pub(super) regular_refused: Option<String>,
     /// The options with steady limits; none when they are not wanted, or a part of them was given up.
@@ -100,7 +106,9 @@ impl<'a> Site<'a> {
     /// 3. Either is tried with steady limits of the skeleton first, once (and once more with the tips of wedges beside the bodies, where
     ///    those may be what is missing), then with the regular layout of quads, once, and with the
     ///    plain one when those parts are refused.
-    /// 4. Where flat faces could not be cut plane, all is made once more without their bulge.
+    /// 4. Where quads of a size that the user chose give no sound body, those of the default size are tried before the proposal is made
+    ///    as a whole, or after that if there are no bodies.
+    /// 5. Where flat faces could not be cut plane, all is made once more without their bulge.
     pub(super) fn build(&mut self) -> Result<Made, PipelineError> {
         for _ in 0..FLAT_ROUNDS {
             let made = self.build_once()?;
@@ -117,18 +125,41 @@ impl<'a> Site<'a> {
     }
 
     fn build_once(&mut self) -> Result<Made, PipelineError> {
-        match self.without_bodies() {
-            Ok(Some(made)) => return Ok(made),
-            Ok(None) => {}
-            Err(error)
-                if error.is_cancelled() || matches!(error.source, StageError::Growth { .. }) =>
-            {
-                return Err(error);
+        let told = self.monitor.warnings().len();
+        if self.cuts_bodies_out() {
+            if let Some(made) = self.tried_without_bodies()? {
+                return Ok(made);
             }
-            Err(error) => self.give_up(&format!("{} failed: {}", error.stage, error.source)),
+            if self.takes_usual_sizes(told)
+                && let Some(made) = self.tried_without_bodies()?
+            {
+                return Ok(made);
+            }
         }
         let problem = |tried: &(Made, Option<String>)| tried.1.clone();
-        Ok(self.by_layouts(Self::as_a_whole, problem)?.0)
+        let made = self.by_layouts(Self::as_a_whole, problem)?.0;
+        let sound = !made.shape.wrapped && made.shape.sound();
+        if !sound && self.takes_usual_sizes(told) {
+            return Ok(self.by_layouts(Self::as_a_whole, problem)?.0);
+        }
+        Ok(made)
+    }
+
+    fn cuts_bodies_out(&self) -> bool {
+        self.options.non_design.cut_out && !self.bodies.bosses.surface.triangles.is_empty()
+    }
+
+    /// The part without its bodies; none, with the reason told, where there is none.
+    fn tried_without_bodies(&mut self) -> Result<Option<Made>, PipelineError> {
+        match self.without_bodies() {
+            Err(error)
+                if !error.is_cancelled() && !matches!(error.source, StageError::Growth { .. }) =>
+            {
+                self.give_up(&format!("{} failed: {}", error.stage, error.source));
+                Ok(None)
+            }
+            tried => tried,
+        }
     }
 
     fn give_up(&self, reason: &str) {
@@ -140,9 +171,6 @@ impl<'a> Site<'a> {
 
     fn without_bodies(&mut self) -> Result<Option<Made>, PipelineError> {
         let options = self.options;
-        if !options.non_design.cut_out || self.bodies.bosses.surface.triangles.is_empty() {
-            return Ok(None);
-        }
         let design = match self.design(&options.cut_out)? {
             Ok(design) => design,
             Err(problem) => {
@@ -421,6 +449,7 @@ impl<'a> Site<'a> {
         block.regular_refused.clone_from(&self.regular_refused);
         block.steady = self.steady.is_some();
         block.wedges = self.wedges;
+        block.size_refused = self.size_refused;
         block.voxel = self.remeshed.field.spacing;
         block.steady_refused.clone_from(&self.steady_refused);
         report.skeleton = Some(block);

@@ -224,6 +224,8 @@ pub struct SkeletonBlock {
     pub steady_refused: Option<String>,
     /// Of a design part that keeps the tips of its wedges beside non-design bodies, `retry.wedge`.
     pub wedges: bool,
+    /// Quads of the size asked for gave no sound body; these have the default size.
+    pub size_refused: bool,
     /// Voxel of the proposal that it is made of, mm; the body follows the proposal at the voxel of the remesh.
     pub voxel: f64,
     /// Quads.
