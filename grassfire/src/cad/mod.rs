@@ -13,6 +13,8 @@ mod options;
 pub mod primitives;
 
 #[cfg(feature = "occt")]
+mod beside;
+#[cfg(feature = "occt")]
 mod bores;
 #[cfg(feature = "occt")]
 mod build;

@@ -9,6 +9,7 @@
 mod bosses;
 mod domain;
 mod facets;
+mod fitting;
 mod flats;
 mod notches;
 mod options;

@@ -13,6 +13,7 @@ pub mod papers;
 mod recognised;
 pub mod render;
 mod repairs;
+mod shape;
 mod verification;
 
 use std::path::Path;
@@ -22,10 +23,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 pub use blocks::{
-    BodyBlock, BoreBlock, CandidateBlock, CornerDeviation, DesignFaceBlock, DistanceBlock,
-    FileEntry, FlatBlock, InputBlock, InputFile, NonDesignBlock, OptimizeBlock, RadiusRange,
-    RefusedFile, RemeshBlock, RepairEntry, Report, SkeletonBlock, SolidBlock, StageEntry,
-    TopologyBlock, TopologyChangeEntry, VolumeBlock,
+    BoreBlock, CandidateBlock, DesignFaceBlock, DistanceBlock, FileEntry, FlatBlock, InputBlock,
+    InputFile, NonDesignBlock, OptimizeBlock, RefusedFile, RemeshBlock, RepairEntry, Report,
+    SolidBlock, StageEntry, TopologyChangeEntry, VolumeBlock,
 };
 pub use casting::{
     FeedBlock, FeederBlock, FilletBlock, FindingBlock, HotSpotBlock, InfeasibleBlock, MouldBlock,
@@ -35,6 +35,7 @@ pub use checks::{Check, Limits, judge};
 pub use editing::EditBlock;
 pub use html::to_html;
 pub use repairs::{RepairsBlock, RoomBlock, VariantBlock};
+pub use shape::{BodyBlock, CornerDeviation, RadiusRange, SkeletonBlock, TopologyBlock};
 pub use verification::{LoadCaseBlock, ProposalBlock, TetrahedraBlock, VerifyBlock};
 
 use crate::io::{IoError, atomic_write};
