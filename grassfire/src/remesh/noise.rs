@@ -59,7 +59,7 @@ impl CleanUp<'_> {
 /// 4. Repeat until nothing changes.
 ///
 /// With `wanted`, only surplus tunnels and cavities are removed, narrowest first.
-/// Voxels inside the capsules of `keep_open` are never filled or cut.
+/// Voxels inside the capsules of `keep_open` are never filled or cut; islands in them go as elsewhere.
 pub(super) fn remove_noise(
     grid: &mut VoxelGrid<f32>,
     width: f64,
@@ -178,7 +178,8 @@ fn drop_small(work: &mut CleanUp, wanted: Option<Wanted>) {
             let small = component.extent() as f64 <= limit && !component.voxels.is_empty();
             // The first empty component is the outside; it holds the border voxels.
             let outside = component.voxels.iter().any(|&v| work.set.on_border(v));
-            let held = component.voxels.iter().any(|&v| work.is_kept(v));
+            // Islands are in the way there.
+            let held = !solid && component.voxels.iter().any(|&v| work.is_kept(v));
             if !small || outside || held || most == 0 {
                 continue;
             }

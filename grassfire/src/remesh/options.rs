@@ -56,7 +56,7 @@ pub struct RemeshOptions {
     /// otherwise the remesh grid. A closed manifold mesh that was not made on a grid keeps all its tunnels and cavities:
     /// there only what sampling added is removed, and pieces smaller than this.
     pub min_tunnel: f64,
-    /// Places where the topology is never touched: the bores of non-design bodies.
+    /// Places where nothing is filled or cut, but islands go: the bores of non-design bodies.
     pub keep_open: Vec<Capsule>,
     /// Standard deviation of the Gaussian filter on the signed distance, voxels; 0 = none.
     pub smoothing: f64,

@@ -133,6 +133,30 @@ fn a_kept_bore_stays() {
     assert_eq!((out.genus_before, out.genus_after), (2, 1));
 }
 
+/// A repair along a slanting draw direction left specks of a voxel in the mouth of a bore; they stayed, because bores are kept open, and
+/// the body of each cut itself.
+#[test]
+fn a_speck_in_a_kept_bore_goes() {
+    let mut density = plate(&[(5, 5, 4)]);
+    let speck = density.index(7, 7, 3);
+    density.values[speck] = 1.0;
+    let bore = Capsule {
+        a: Vec3::new(6.5, 6.5, 0.0),
+        b: Vec3::new(6.5, 6.5, 6.0),
+        radius: 2.0,
+    };
+    let options = RemeshOptions {
+        keep_open: vec![bore],
+        ..RemeshOptions::default()
+    };
+    let out = remesh_density(&density, 0.5, &options, &Monitor::default()).expect("a plate");
+    let kinds: Vec<ChangeKind> = out.changes.iter().map(|c| c.kind).collect();
+    assert_eq!(
+        (kinds, out.genus_after),
+        (vec![ChangeKind::IslandDropped], 1)
+    );
+}
+
 #[test]
 fn islands_cavities_and_short_bridges_go_and_struts_stay() {
     // Two blocks joined by a thick bar; beside it a thin short bridge.
