@@ -2,7 +2,7 @@
 //!
 //! Run with `cargo bench --bench casting`; `-- small` leaves out the grid of 5 million cells. Prints seconds and, where the
 //! size grows, the cost relative to the smallest. With `-- part.obj ...` it prints how far the best draw direction of each part
-//! lies from the best of 20,626 directions, which are a degree apart.
+//! lies from the best of 20,626 directions, which are a degree apart, and from the best a quarter of a degree apart around the best of these.
 
 use std::path::Path;
 use std::time::Instant;
@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use grassfire::Vec3;
 use grassfire::casting::feed::{FeedOptions, feed, place_feeders};
+use grassfire::casting::mould::dexels::axes;
 use grassfire::casting::mould::directions::{FINER, allowed, best_of, judge, spiral};
 use grassfire::casting::mould::{Direction, best_direction};
 use grassfire::casting::solidify::{SolidifyOptions, solidify};
@@ -154,7 +155,33 @@ const ALL: usize = 20_626;
 /// So many of the best of all are judged on the search's finest lattice: what the lines above cannot tell apart.
 const CLOSE: usize = 300;
 
+/// Around how many of these, no two of which lie within [`DISC`], directions of a finer grid are judged, too.
+const HEADS: usize = 12;
+/// Radius of the finer grid and its step, degrees.
+const DISC: f64 = 3.0;
+const STEP: f64 = 0.25;
+
+/// Directions [`STEP`] apart within [`DISC`] of one.
+fn disc(draw: &Vec3) -> Vec<Vec3> {
+    let [u, v, w] = axes(draw);
+    let (count, step) = ((DISC / STEP) as i32, STEP.to_radians().tan());
+    let all = (-count..=count).flat_map(|i| (-count..=count).map(move |j| (i, j)));
+    let within = all.filter(|(i, j)| i * i + j * j <= count * count);
+    within
+        .map(|(i, j)| (w + step * (f64::from(i) * u + f64::from(j) * v)).normalize())
+        .collect()
+}
+
+/// Degrees between two lines.
+fn angle(a: &Vec3, b: &Vec3) -> f64 {
+    a.dot(b).abs().min(1.0).acos().to_degrees()
+}
+
 /// The search of `grassfire mould` beside all directions, by the same order on the same lines.
+///
+/// 1. The best of all directions a degree apart, on the search's finest lattice.
+/// 2. Of those that count as equal to it, with twice the usual allowance because a degree beside a low is above it, the best that lie
+///    [`DISC`] apart: all directions of a finer grid around each.
 fn draw_beside_all(part: &str) {
     let read = read_input(
         Path::new(part),
@@ -169,38 +196,76 @@ fn draw_beside_all(part: &str) {
     let clock = Instant::now();
     let found = best_direction(&mesh, 300, lines, draft, &Monitor::default()).expect("in time");
     let searched = clock.elapsed().as_secs_f64();
-    let clock = Instant::now();
     let look = |draws: &[Vec3], lines: usize| -> Vec<Direction> {
         let seen = draws
             .par_iter()
             .map(|draw| judge(&mesh, draw, lines, draft));
         seen.collect()
     };
+    let clock = Instant::now();
     let all = look(&spiral(ALL), lines);
     let close = best_of(&all, allowed(&all, &mesh, lines), CLOSE);
     let close: Vec<Vec3> = close.iter().map(|d| d.draw).collect();
-    let mut last = look(&close, FINER * lines);
-    last.push(found);
-    let equal = allowed(&last, &mesh, FINER * lines);
-    last.pop();
-    let best = best_of(&last, equal, 1)[0];
-    let angle = |a: &Vec3, b: &Vec3| a.dot(b).abs().min(1.0).acos().to_degrees();
-    println!(
-        "{part}: search {searched:.1} s, all {:.1} s, {:.2} degrees apart, search {:?} than all",
-        clock.elapsed().as_secs_f64(),
-        angle(&found.draw, &best.draw),
-        found.compare(&best, equal)
-    );
-    for direction in [found, best] {
-        let [x, y, z]: [f64; 3] = direction.draw.into();
-        println!(
-            "  ({x:.4}, {y:.4}, {z:.4}) undercut {:.0} mm3 in {}, flatness {:.2} mm, little draft {:.1} %",
-            direction.undercut,
-            direction.undercuts,
-            direction.flatness,
-            100.0 * direction.low_draft
-        );
+    let mut seen = look(&close, FINER * lines);
+    let equal = |seen: &[Direction]| allowed(seen, &mesh, FINER * lines);
+    let best_beside = |seen: &[Direction]| {
+        let mut both = seen.to_vec();
+        both.push(found);
+        let equal = equal(&both);
+        (best_of(seen, equal, 1)[0], equal)
+    };
+    println!("{part}: search {searched:.1} s");
+    tell("search", &found, &found, equal(&[found]));
+    let (best, equal_now) = best_beside(&seen);
+    println!("  all: {:.1} s", clock.elapsed().as_secs_f64());
+    tell("all", &best, &found, equal_now);
+
+    let least = seen
+        .iter()
+        .map(|d| d.undercut)
+        .fold(f64::INFINITY, f64::min);
+    let wide = 2.0 * equal(&seen) - least;
+    let mut heads: Vec<Vec3> = Vec::new();
+    let mut left_out = 0;
+    for one in best_of(&seen, equal(&seen), seen.len()) {
+        let apart = heads.iter().all(|head| angle(head, &one.draw) > DISC);
+        if one.undercut <= wide && apart {
+            if heads.len() < HEADS {
+                heads.push(one.draw);
+            } else {
+                left_out += 1;
+            }
+        }
     }
+    let clock = Instant::now();
+    for head in &heads {
+        seen.extend(look(&disc(head), FINER * lines));
+    }
+    let (best, equal_now) = best_beside(&seen);
+    println!(
+        "  finer around {}, {left_out} left out: {:.1} s",
+        heads.len(),
+        clock.elapsed().as_secs_f64()
+    );
+    tell("finer", &best, &found, equal_now);
+    // The best of the neighbourhood of what was found.
+    let near: Vec<Direction> = look(&disc(&found.draw), FINER * lines);
+    let (best, equal_now) = best_beside(&near);
+    tell("around the found one", &best, &found, equal_now);
+}
+
+/// A direction beside the one found.
+fn tell(name: &str, direction: &Direction, found: &Direction, equal: f64) {
+    let [x, y, z]: [f64; 3] = direction.draw.into();
+    println!(
+        "  {name}: ({x:.4}, {y:.4}, {z:.4}) undercut {:.0} mm3 (equal up to {equal:.0}) in {}, flatness {:.2} mm, little draft {:.1} %, {:.2} degrees apart, the found one is {:?} in the order",
+        direction.undercut,
+        direction.undercuts,
+        direction.flatness,
+        100.0 * direction.low_draft,
+        angle(&found.draw, &direction.draw),
+        found.compare(direction, equal)
+    );
 }
 
 fn freezing(across: &[u32]) {
