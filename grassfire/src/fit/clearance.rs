@@ -3,22 +3,15 @@
 use rayon::prelude::*;
 
 use crate::Vec3;
-use crate::mesh::{Bvh, Winding};
+use crate::mesh::Bvh;
+use crate::remesh::films::{Beside, FILM, Walls};
 use crate::remesh::{Bosses, Capsule};
 use crate::voxel::VoxelGrid;
 
-/// Near the bodies distances are exact up to this many voxels; what lies deeper is left alone.
-const REACH: f64 = 4.0;
 /// Outside the walls the drawing fades over this many voxels; over more of them members would lose volume.
 const FADE: f64 = 1.0;
-/// What stands over a wall by up to the first number of voxels is the proposal's copy of the body alone, as rough as its own voxels; from
-/// the second on it is a member.
-const FILM: [f64; 2] = [1.5, 2.5];
 /// The body stays below walls at least so far where there is a film, voxels.
 const BELOW: f64 = 0.5;
-/// Surfaces of proposal and body whose normals differ by less than the first cosine run along each other; from the
-/// second on they count as crossing.
-const ALONG: [f64; 2] = [0.8, 0.3];
 
 /// The field whose surface the body should follow, so that its union with the bodies cuts cleanly.
 ///
@@ -38,42 +31,20 @@ pub fn clear_of(
     films: bool,
 ) -> VoxelGrid<f32> {
     let bvh = Bvh::new(&bosses.surface);
-    let (Some((lo, hi)), true) = (bvh.bounds(), depth > 0.0) else {
+    let (Some(walls), true) = (Walls::new(&bosses.surface, &bvh), depth > 0.0) else {
         return field.clone();
     };
-    let winding = Winding::new(&bvh);
     let voxel = field.spacing;
-    let reach = REACH * voxel;
     let outside = if films { FILM[1] } else { FADE } * voxel;
     let below = depth.min(BELOW * voxel);
-    let margin = Vec3::repeat(outside);
-    let near = |p: &Vec3| (0..3).all(|a| lo[a] - margin[a] <= p[a] && p[a] <= hi[a] + margin[a]);
     let value = |(index, &f): (usize, &f32)| {
         let [i, j, k] = field.ijk(index);
         let p = field.origin + voxel * Vec3::new(i as f64, j as f64, k as f64);
         let f = f64::from(f);
-        if f.abs() > reach || !near(&p) {
+        let Some(Beside { s, along, film }) = walls.beside(field, &p, f, outside) else {
             return f as f32;
-        }
-        let inside = winding.at(&p) > 0.5;
-        let nearest = bvh.nearest(&p, reach);
-        let distance = nearest.map_or(reach, |n| n.distance);
-        let s = if inside { distance } else { -distance };
-        if s <= -outside {
-            return f as f32;
-        }
-        let along = nearest.map_or(0.0, |n| {
-            let [a, b, c] = bosses.surface.corners(n.triangle as usize);
-            let off = (p - n.point) * if inside { 1.0 } else { -1.0 };
-            let inward = off
-                .try_normalize(1e-3 * voxel)
-                .unwrap_or_else(|| -(b - a).cross(&(c - a)).normalize());
-            let slope = field.gradient(&p);
-            let cosine = slope.dot(&inward) / slope.norm().max(1e-12);
-            ((cosine - ALONG[1]) / (ALONG[0] - ALONG[1])).clamp(0.0, 1.0)
-        });
+        };
         let drawn = f - depth * along * (1.0 + s / (FADE * voxel)).clamp(0.0, 1.0);
-        let film = along * ((FILM[1] - (f - s) / voxel) / (FILM[1] - FILM[0])).clamp(0.0, 1.0);
         let film = if films { film } else { 0.0 };
         let drawn = drawn.min(f + film * ((s - below).min(f) - f));
         let band = bosses

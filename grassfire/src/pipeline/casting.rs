@@ -194,6 +194,10 @@ fn repaired(
     let mut asked = asked.repair_options(height, cell);
     asked.bores.clone_from(&bodies.bosses.free);
     asked.cores_may_close = grown;
+    if !bodies.recognised {
+        // Recognised ones are made from the proposal's own walls.
+        asked.walls = bodies.bosses.surface.clone();
+    }
     let repaired = mould::repair(mesh, &draw, &asked, monitor)?;
     let mut on_grid = RemeshOptions {
         voxel: Some(cell),

@@ -14,6 +14,7 @@ mod digital;
 mod drawn;
 mod error;
 mod extract;
+pub(crate) mod films;
 mod input;
 mod intersect;
 mod islands;

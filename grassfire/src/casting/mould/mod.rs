@@ -146,6 +146,7 @@ impl MouldOptions {
             cores: self.cores.iter().map(|p| Vec3::from(*p)).collect(),
             cores_may_close: false,
             bores: Vec::new(),
+            walls: TriMesh::default(),
             removals: self.removals.iter().map(|p| Vec3::from(*p)).collect(),
             min_gap: self.min_gap,
         }

@@ -157,6 +157,7 @@ mod tests {
             cores,
             cores_may_close: false,
             bores,
+            walls: TriMesh::default(),
             removals: Vec::new(),
             min_gap: 0.0,
         }

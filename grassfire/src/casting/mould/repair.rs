@@ -13,6 +13,7 @@ use crate::Vec3;
 use crate::fe::components;
 use crate::mesh::TriMesh;
 use crate::monitor::Monitor;
+use crate::remesh::films::without_films;
 use crate::remesh::{Capsule, RemeshError, RemeshOptions, remesh, remesh_density};
 use crate::voxel::VoxelGrid;
 
@@ -68,6 +69,8 @@ pub struct RepairOptions {
     pub cores_may_close: bool,
     /// Bores that cores make likewise.
     pub bores: Vec<Capsule>,
+    /// Surface of the given bodies: with draft, films over their walls go. Empty where there are none.
+    pub walls: TriMesh,
     /// A place in each undercut whose lesser side is taken away, mm.
     pub removals: Vec<Vec3>,
     /// Gaps narrower than this go solid, mm; 0 keeps all.
@@ -98,7 +101,9 @@ pub struct Repaired {
 /// 5. With `min_gap` narrower gaps go solid, but not what cores make; what that hides is filled.
 /// 6. Draft: from both ends towards `parting`, or to what of a wall is nearest to it, every value becomes at least the one before
 ///    plus the tangent of the draft times the step.
-/// 7. The surface is extracted and turned back.
+/// 7. With draft, films up to 1.5 voxels thick over `walls` go, those of the draft and those of the part: a copy of a given body on
+///    voxels is larger than the body here and there. How much that is is told as a warning.
+/// 8. The surface is extracted and turned back.
 ///
 /// # Errors
 /// [`MouldError::Grid`] when the part cannot be put on the grid, [`MouldError::Place`] for a place without an undercut; cancelled.
@@ -140,6 +145,12 @@ pub fn repair(
         settle_empty(&mut field);
         let tangent = options.draft.to_radians().tan();
         taper(&mut field, tangent, options.parting);
+        let walls = turn(&options.walls, |p| into(p, &frame));
+        let taken = take_films(&mut field, &walls, monitor);
+        if taken && options.kind != Repair::Off {
+            // Beside a member that stays a film that went in part leaves slots.
+            fill(&mut field);
+        }
     }
     let after = multiple(&field);
     for (v, value) in open {
@@ -152,6 +163,31 @@ pub fn repair(
         volume: [volume_before, out.solid.volume()],
         multiple: [before, after],
     })
+}
+
+/// Takes away the films over the walls of given bodies; whether there were any.
+fn take_films(field: &mut VoxelGrid<f32>, walls: &TriMesh, monitor: &Monitor) -> bool {
+    let cleared = without_films(field, walls);
+    let taken = filled(field) - filled(&cleared);
+    // Less than a voxel is nothing.
+    if taken <= field.spacing.powi(3) {
+        return false;
+    }
+    monitor.warn(
+        STAGE,
+        format!(
+            "films of {taken:.0} mm3 over the walls of given bodies are taken away with the repair"
+        ),
+    );
+    *field = cleared;
+    true
+}
+
+/// Volume of a signed distance, mm3: voxels at the surface count in part.
+fn filled(field: &VoxelGrid<f32>) -> f64 {
+    let h = field.spacing;
+    let share = |&f: &f32| (0.5 + f64::from(f) / h).clamp(0.0, 1.0);
+    h.powi(3) * field.values.iter().map(share).sum::<f64>()
 }
 
 /// A part on voxels with the draw direction as z.
