@@ -194,8 +194,8 @@ fn repaired(
     let mut asked = asked.repair_options(height, cell);
     asked.bores.clone_from(&bodies.bosses.free);
     asked.cores_may_close = grown;
-    if !bodies.recognised {
-        // Recognised ones are made from the proposal's own walls.
+    // Recognised ones are made from the proposal's own walls; where sections grow, films do, too, and go in the fit.
+    if !bodies.recognised && !options.feed.active() {
         asked.walls = bodies.bosses.surface.clone();
     }
     let repaired = mould::repair(mesh, &draw, &asked, monitor)?;
