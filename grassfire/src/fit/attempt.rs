@@ -59,18 +59,13 @@ pub(super) fn attempt(
     }
     let tangles = untangle::untangle(&mut solver, &mut points, &mut fitted, options, monitor)?;
     let body = body.clone();
-    let mut state = refine::State {
+    let state = refine::State {
         body,
         solver,
         points,
         tangles,
     };
-    if state.tangles.sound() {
-        state = refine::refine(state, skeleton, &mut fitted, options, monitor)?;
-        settle::settle(&mut state, &fitted, options, monitor)?;
-    }
-    monitor.step(STAGE, "distances", 0.97)?;
-    Ok(Attempt::of(state, fitted, options))
+    finished(state, fitted, skeleton, options, monitor)
 }
 
 /// Steps 4 and 5 of [`super::fit`] alone, of a body that was fitted to another field.
@@ -88,20 +83,32 @@ pub(super) fn settled(
     let placed = fitted.mesh.points.iter().map(|p| field.to_grid(p));
     let points: Vec<Vec3> = placed.collect();
     let tangles = Tangles::of(&solver, &points);
-    let mut state = refine::State {
+    let state = refine::State {
         body: fitted.body.clone(),
         solver,
         points,
         tangles,
     };
-    let mut fitted = Fitted {
+    let fitted = Fitted {
         iso_volume,
         ..fitted.clone()
     };
+    finished(state, fitted, skeleton, options, monitor)
+}
+
+/// Refines and settles a body without trouble, and measures it.
+fn finished(
+    mut state: refine::State,
+    mut fitted: Fitted,
+    skeleton: &Skeleton,
+    options: &FitOptions,
+    monitor: &Monitor,
+) -> Result<Attempt, FitError> {
     if state.tangles.sound() {
         state = refine::refine(state, skeleton, &mut fitted, options, monitor)?;
         settle::settle(&mut state, &fitted, options, monitor)?;
     }
+    monitor.step(STAGE, "distances", 0.97)?;
     Ok(Attempt::of(state, fitted, options))
 }
 

@@ -47,13 +47,6 @@ impl Site<'_> {
         let Some(cut) = design else {
             return Ok(Err("nothing is left of the part".to_owned()));
         };
-        let fine = match self.fine {
-            Some(fine) => self
-                .record
-                .stage("cut_out", || cut_out(fine, bosses, options, monitor))?,
-            None => None,
-        };
-        let fine = fine.filter(|fine| same_topology(&fine.part, &cut.part));
         let (united, wanted) = (cut.united, cut.wanted);
         if united != wanted {
             return Ok(Err(format!(
@@ -61,6 +54,13 @@ impl Site<'_> {
                 united.b0, united.b1, wanted.b0, wanted.b1
             )));
         }
+        let fine = match self.fine {
+            Some(fine) => self
+                .record
+                .stage("cut_out", || cut_out(fine, bosses, options, monitor))?,
+            None => None,
+        };
+        let fine = fine.filter(|fine| same_topology(&fine.part, &cut.part));
         let rise = self.options.flats.raise * remeshed.field.spacing;
         let raised = |part: &Remeshed| raised(&part.field, &self.bodies.flats, rise);
         let fine = fine.map(|cut| {

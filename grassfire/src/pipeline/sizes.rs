@@ -33,8 +33,8 @@ impl Site<'_> {
         self.monitor.warn("skeleton", text);
         (self.options, self.size_refused) = (options, true);
         (self.layout, self.regular_refused) = (self.first_layout, None);
-        let anew = self.layout == Layout::Auto && self.drawn.is_none();
-        self.steady = steady(options).filter(|_| anew);
+        // There are none for a skeleton drawn elsewhere.
+        self.steady = steady(options).filter(|_| self.layout == Layout::Auto);
         self.steady_refused = None;
         true
     }
