@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
 use super::TriMesh;
+use super::bvh::{Bvh, Node};
 use crate::Vec3;
 
 /// Two triangles with a common edge count as folded over when, seen along that edge, they leave it
@@ -12,7 +13,7 @@ const FOLDED: f64 = 0.999_961_923;
 
 /// Pairs `[i, j]`, `i < j`, of triangles that intersect, in ascending order.
 ///
-/// 1. A bounding volume tree over the triangles gives candidate pairs.
+/// 1. A bounding volume tree over the triangles gives candidate pairs, each once.
 /// 2. No common point: an edge of one must cross the other (exact orientation predicates, touching
 ///    counts), or both lie in one plane and overlap there.
 /// 3. One common point: the edge opposite to it in either triangle must cross the other triangle.
@@ -23,38 +24,25 @@ const FOLDED: f64 = 0.999_961_923;
 /// does not depend on the number of threads. Predicates: J. R. Shewchuk, 1997,
 /// doi:10.1007/PL00009321.
 pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
-    let n = mesh.points.len();
-    let usable = |t: &[u32; 3]| {
-        t.iter()
-            .all(|&v| (v as usize) < n && mesh.points[v as usize].iter().all(|x| x.is_finite()))
-            && t[0] != t[1]
-            && t[1] != t[2]
-            && t[2] != t[0]
-    };
-    let ids: Vec<u32> = (0..mesh.triangles.len() as u32)
-        .filter(|&t| usable(&mesh.triangles[t as usize]))
-        .collect();
-    let boxes: Vec<Aabb> = ids
-        .iter()
-        .map(|&t| Aabb::around(&mesh.corners(t as usize)))
-        .collect();
-    let tree = Tree::new(&boxes);
-    let found: Vec<Vec<[u32; 2]>> = (0..ids.len())
-        .into_par_iter()
-        .with_min_len(256)
-        .map(|i| {
+    let tree = Bvh::new(mesh);
+    let boxes: Vec<Aabb> = tree.corners.iter().map(Aabb::around).collect();
+    let leaves: Vec<&Node> = tree.nodes.iter().filter(|node| node.right == 0).collect();
+    let mut found: Vec<[u32; 2]> = leaves
+        .par_iter()
+        .with_min_len(64)
+        .flat_map_iter(|leaf| {
             let mut pairs = Vec::new();
-            tree.overlapping(&boxes, &boxes[i], |j| {
-                let (a, b) = (ids[i], ids[j as usize]);
-                if a < b && intersect(mesh, a as usize, b as usize) {
-                    pairs.push([a, b]);
+            overlapping_pairs(&tree, &boxes, leaf, |[a, b]| {
+                let (i, j) = (tree.ids[a].min(tree.ids[b]), tree.ids[a].max(tree.ids[b]));
+                if intersect(mesh, i as usize, j as usize) {
+                    pairs.push([i, j]);
                 }
             });
-            pairs.sort_unstable();
             pairs
         })
         .collect();
-    found.into_iter().flatten().collect()
+    found.sort_unstable();
+    found
 }
 
 #[derive(Clone, Copy)]
@@ -64,91 +52,41 @@ struct Aabb {
 }
 
 impl Aabb {
-    fn around(points: &[Vec3]) -> Self {
-        let empty = Self {
-            lo: Vec3::repeat(f64::INFINITY),
-            hi: Vec3::repeat(f64::NEG_INFINITY),
-        };
-        points.iter().fold(empty, |b, p| Self {
-            lo: b.lo.inf(p),
-            hi: b.hi.sup(p),
-        })
-    }
-
-    fn join(&self, other: &Self) -> Self {
+    fn around([a, b, c]: &[Vec3; 3]) -> Self {
         Self {
-            lo: self.lo.inf(&other.lo),
-            hi: self.hi.sup(&other.hi),
+            lo: a.inf(b).inf(c),
+            hi: a.sup(b).sup(c),
         }
     }
 
-    fn overlaps(&self, other: &Self) -> bool {
-        (0..3).all(|a| self.lo[a] <= other.hi[a] && other.lo[a] <= self.hi[a])
+    fn overlaps(&self, lo: &Vec3, hi: &Vec3) -> bool {
+        (0..3).all(|a| self.lo[a] <= hi[a] && lo[a] <= self.hi[a])
     }
 }
 
-const LEAF: usize = 4;
-
-/// A binary tree over boxes, nodes in depth-first order.
-struct Tree {
-    /// Box, first item, item count (0: inner node), and where the right child is.
-    nodes: Vec<(Aabb, u32, u32, u32)>,
-    items: Vec<u32>,
-}
-
-impl Tree {
-    fn new(boxes: &[Aabb]) -> Self {
-        let mut tree = Self {
-            nodes: Vec::new(),
-            items: (0..boxes.len() as u32).collect(),
-        };
-        if !boxes.is_empty() {
-            let mut items = std::mem::take(&mut tree.items);
-            tree.build(boxes, &mut items, 0);
-            tree.items = items;
+/// Pairs of triangles, by their places in the order of the tree, whose boxes overlap: the first is in `leaf`, the second behind it.
+/// So each pair is met once.
+fn overlapping_pairs(tree: &Bvh, boxes: &[Aabb], leaf: &Node, mut visit: impl FnMut([usize; 2])) {
+    let range = |node: &Node| node.first as usize..(node.first + node.count) as usize;
+    let around = Aabb {
+        lo: leaf.lo,
+        hi: leaf.hi,
+    };
+    let mut stack = vec![0u32];
+    while let Some(top) = stack.pop() {
+        let node = &tree.nodes[top as usize];
+        if range(node).end <= range(leaf).start || !around.overlaps(&node.lo, &node.hi) {
+            continue;
         }
-        tree
-    }
-
-    fn build(&mut self, boxes: &[Aabb], items: &mut [u32], first: u32) {
-        let around = items
-            .iter()
-            .skip(1)
-            .fold(boxes[items[0] as usize], |b, &i| b.join(&boxes[i as usize]));
-        let here = self.nodes.len();
-        self.nodes.push((around, first, items.len() as u32, 0));
-        if items.len() <= LEAF {
-            return;
+        if node.right != 0 {
+            stack.push(node.right);
+            stack.push(top + 1);
+            continue;
         }
-        let axis = (around.hi - around.lo).imax();
-        let key = |i: u32| boxes[i as usize].lo[axis] + boxes[i as usize].hi[axis];
-        let half = items.len() / 2;
-        items.select_nth_unstable_by(half, |&a, &b| key(a).total_cmp(&key(b)).then(a.cmp(&b)));
-        let (left, right) = items.split_at_mut(half);
-        self.build(boxes, left, first);
-        let at = self.nodes.len() as u32;
-        self.build(boxes, right, first + half as u32);
-        self.nodes[here].2 = 0;
-        self.nodes[here].3 = at;
-    }
-
-    fn overlapping(&self, boxes: &[Aabb], query: &Aabb, mut visit: impl FnMut(u32)) {
-        let mut stack = vec![0u32];
-        while let Some(at) = stack.pop() {
-            let Some((around, first, count, right)) = self.nodes.get(at as usize) else {
-                continue;
-            };
-            if !around.overlaps(query) {
-                continue;
-            }
-            if *count == 0 {
-                stack.push(*right);
-                stack.push(at + 1);
-                continue;
-            }
-            for &item in &self.items[*first as usize..(*first + *count) as usize] {
-                if boxes[item as usize].overlaps(query) {
-                    visit(item);
+        for a in range(leaf) {
+            for b in range(node).filter(|&b| b > a) {
+                if boxes[a].overlaps(&boxes[b].lo, &boxes[b].hi) {
+                    visit([a, b]);
                 }
             }
         }
@@ -167,10 +105,15 @@ fn side(t: &[Vec3; 3], p: &Vec3) -> f64 {
     orient3d(coord(&t[0]), coord(&t[1]), coord(&t[2]), coord(p))
 }
 
-/// The segment meets the triangle in a point, their planes not coinciding.
-fn crosses(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
-    let (sp, sq) = (side(t, p), side(t, q));
-    if (sp > 0.0 && sq > 0.0) || (sp < 0.0 && sq < 0.0) || (sp == 0.0 && sq == 0.0) {
+/// All on one side of a plane, none in it.
+fn apart(sides: &[f64]) -> bool {
+    sides.iter().all(|&s| s > 0.0) || sides.iter().all(|&s| s < 0.0)
+}
+
+/// The segment, whose ends lie on these sides of the triangle's plane, meets the triangle in a point, their planes not
+/// coinciding.
+fn crosses([p, q]: [&Vec3; 2], sides: [f64; 2], t: &[Vec3; 3]) -> bool {
+    if apart(&sides) || sides == [0.0, 0.0] {
         return false;
     }
     let turn = |a: &Vec3, b: &Vec3| orient3d(coord(p), coord(q), coord(a), coord(b));
@@ -180,6 +123,9 @@ fn crosses(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
 
 fn intersect(mesh: &TriMesh, i: usize, j: usize) -> bool {
     let (ti, tj) = (mesh.triangles[i], mesh.triangles[j]);
+    if !distinct(ti) || !distinct(tj) {
+        return false;
+    }
     let (a, b) = (mesh.corners(i), mesh.corners(j));
     let mut shared = [(0, 0); 9];
     let mut count = 0;
@@ -192,18 +138,48 @@ fn intersect(mesh: &TriMesh, i: usize, j: usize) -> bool {
         }
     }
     match shared[..count] {
-        [] => {
-            let edge =
-                |t: &[Vec3; 3], k: usize, other: &[Vec3; 3]| crosses(&t[k], &t[(k + 1) % 3], other);
-            (0..3).any(|k| edge(&a, k, &b) || edge(&b, k, &a)) || coplanar_overlap(&a, &b)
-        }
-        [(k, m)] => {
-            crosses(&a[(k + 1) % 3], &a[(k + 2) % 3], &b)
-                || crosses(&b[(m + 1) % 3], &b[(m + 2) % 3], &a)
-        }
+        [] => disjoint_corners_meet(&a, &b),
+        [(k, m)] => others_meet(&a, k, &b, m),
         [(k, m), (l, n)] => folded(&a, 3 - k - l, &b, 3 - m - n),
         _ => true,
     }
+}
+
+fn distinct([a, b, c]: [u32; 3]) -> bool {
+    a != b && b != c && c != a
+}
+
+/// Two triangles without a common point intersect.
+fn disjoint_corners_meet(a: &[Vec3; 3], b: &[Vec3; 3]) -> bool {
+    let of_a = a.map(|p| side(b, &p));
+    if apart(&of_a) {
+        return false;
+    }
+    let of_b = b.map(|p| side(a, &p));
+    if apart(&of_b) {
+        return false;
+    }
+    let edge = |t: &[Vec3; 3], sides: &[f64; 3], k: usize, other: &[Vec3; 3]| {
+        let next = (k + 1) % 3;
+        crosses([&t[k], &t[next]], [sides[k], sides[next]], other)
+    };
+    (0..3).any(|k| edge(a, &of_a, k, b) || edge(b, &of_b, k, a))
+        || (of_a == [0.0; 3] && of_b == [0.0; 3] && coplanar_overlap(a, b))
+}
+
+/// Two triangles with one common point, their corners `k` and `m`, intersect elsewhere, too.
+fn others_meet(a: &[Vec3; 3], k: usize, b: &[Vec3; 3], m: usize) -> bool {
+    let (of_a, of_b) = (opposite(a, k), opposite(b, m));
+    let sides = of_a.map(|p| side(b, p));
+    if apart(&sides) {
+        return false;
+    }
+    crosses(of_a, sides, b) || crosses(of_b, of_b.map(|p| side(a, p)), a)
+}
+
+/// Ends of the edge opposite to a corner.
+fn opposite(t: &[Vec3; 3], corner: usize) -> [&Vec3; 2] {
+    [&t[(corner + 1) % 3], &t[(corner + 2) % 3]]
 }
 
 /// Triangles over a common edge, `k` and `m` their third corners, lie on top of each other.
@@ -222,11 +198,8 @@ fn folded(a: &[Vec3; 3], k: usize, b: &[Vec3; 3], m: usize) -> bool {
     }
 }
 
-/// All six points lie in one plane and the triangles overlap there.
+/// Triangles in one plane overlap there.
 fn coplanar_overlap(a: &[Vec3; 3], b: &[Vec3; 3]) -> bool {
-    if b.iter().any(|p| side(a, p) != 0.0) || a.iter().any(|p| side(b, p) != 0.0) {
-        return false;
-    }
     let normal = (a[1] - a[0]).cross(&(a[2] - a[0]));
     let drop = normal.iamax();
     let flat = |p: &Vec3| Coord {
