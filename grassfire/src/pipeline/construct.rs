@@ -8,7 +8,7 @@ use super::feeding::{Grown, fed};
 use super::fewest::fewest;
 use super::record::Record;
 use super::shape::{self, Base, Shape};
-use super::union::{self, Part};
+use super::union::{Part, Union};
 use super::{ReconstructOptions, measure};
 use crate::fit::{self, FitOptions, clear_of, raised};
 use crate::medial::MedialAxis;
@@ -220,36 +220,32 @@ impl<'a> Site<'a> {
 
     /// The body of a design part united with the bodies.
     fn united(&mut self, base: &Base, wanted: &Betti) -> Result<Judged, PipelineError> {
-        let (remeshed, options, monitor) = (self.remeshed, self.options, self.monitor);
         let (axis, mut shape) = self.shape(base)?;
         if !shape.sound() {
             return Ok(Err("its body cuts itself or folds over".to_owned()));
         }
         let (surface, joined) = self.joined_below(&mut shape)?;
-        let voxel = remeshed.field.spacing;
+        let union = Union {
+            surface: &surface,
+            intersections: 0,
+            voxel: self.remeshed.field.spacing,
+            options: self.options,
+            monitor: self.monitor,
+        };
         let bodies = &*self.bodies;
-        let part = self.record.stage("cad", || {
-            union::united(&surface, joined, bodies, 0, voxel, options, monitor)
-        })?;
-        part.tell(monitor);
-        if self.bodies.refuses_flats(&part.flats) {
-            // It bulges there: no use in judging it.
-            let distance = self.distance(&part)?;
-            return Ok(Ok(Made {
-                axis,
-                shape,
-                part,
-                distance,
-            }));
-        }
-        if let Some(problem) = part.problem(wanted) {
+        let part = self.record.stage("cad", || union.part(joined, bodies))?;
+        // Where flat faces are not plane it bulges, is made once more, and there is no use in judging it.
+        let judged = !self.bodies.refuses_flats(&part.flats);
+        if let Some(problem) = part.problem(wanted).filter(|_| judged) {
             return Ok(Err(problem));
         }
         let distance = self.distance(&part)?;
-        if let Some(problem) = self.too_far(&part, &distance) {
-            return Ok(Err(problem));
+        if judged {
+            if let Some(problem) = self.too_far(&part, &distance) {
+                return Ok(Err(problem));
+            }
+            self.report(&axis, &shape, base.united);
         }
-        self.report(&axis, &shape, base.united);
         Ok(Ok(Made {
             axis,
             shape,
@@ -326,19 +322,21 @@ impl<'a> Site<'a> {
             self.bodies.drop_recognised(monitor);
         }
         let (surface, joined, _) = self.joined(&mut shape, surface)?;
+        let union = Union {
+            surface: &surface,
+            intersections,
+            voxel,
+            options,
+            monitor,
+        };
         let choosy = self.layout == Layout::Auto;
         let bodies = &mut *self.bodies;
         let part = self.record.stage("cad", || {
-            let make = if choosy { union::judged } else { union::part };
-            make(
-                &surface,
-                joined,
-                bodies,
-                intersections,
-                voxel,
-                options,
-                monitor,
-            )
+            if choosy {
+                union.part(joined, bodies)
+            } else {
+                union.part_or_without_recognised(joined, bodies)
+            }
         })?;
         let distance = self.distance(&part)?;
         let problem = (choosy && !self.bodies.refuses_flats(&part.flats))

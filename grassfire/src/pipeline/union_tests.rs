@@ -34,7 +34,14 @@ fn unite(
     let monitor = Monitor::default();
     let options = ReconstructOptions::default();
     let joined = join(&surface, &bodies, &options, &monitor)?;
-    let part = part(&surface, joined, &mut bodies, 0, 1.0, &options, &monitor)?;
+    let union = Union {
+        surface: &surface,
+        intersections: 0,
+        voxel: 1.0,
+        options: &options,
+        monitor: &monitor,
+    };
+    let part = union.part_or_without_recognised(joined, &mut bodies)?;
     let warnings = monitor.warnings().into_iter().map(|w| w.text).collect();
     Ok((part, bodies, warnings))
 }
