@@ -373,7 +373,7 @@ fn rebuild(
         layout,
         first_layout: layout,
         regular_refused: None,
-        steady: steady::steady(options).filter(|_| layout == Layout::Auto && drawn.is_none()),
+        steady: steady::first(options, layout, drawn.as_ref()),
         steady_refused: None,
         wedges: false,
     };

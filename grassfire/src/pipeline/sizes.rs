@@ -2,8 +2,8 @@
 
 use super::ReconstructOptions;
 use super::construct::Site;
-use super::steady::steady;
-use crate::skeleton::{Layout, SkeletonOptions};
+use super::steady;
+use crate::skeleton::SkeletonOptions;
 
 /// The options with quads of the default size; none where they have it.
 pub(super) fn usual(options: &ReconstructOptions) -> Option<ReconstructOptions> {
@@ -33,8 +33,7 @@ impl Site<'_> {
         self.monitor.warn("skeleton", text);
         (self.options, self.size_refused) = (options, true);
         (self.layout, self.regular_refused) = (self.first_layout, None);
-        // There are none for a skeleton drawn elsewhere.
-        self.steady = steady(options).filter(|_| self.layout == Layout::Auto);
+        self.steady = steady::first(options, self.layout, self.drawn);
         self.steady_refused = None;
         true
     }

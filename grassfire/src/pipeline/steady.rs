@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ReconstructOptions;
 use crate::fit::FitOptions;
+use crate::skeleton::{Layout, Skeleton};
 
 /// Limits that decide what is a sheet, a member, a node or a remnant of one; each stands for the option of its name in `medial` or
 /// `skeleton`.
@@ -56,9 +57,19 @@ impl SteadyLimits {
     }
 }
 
+/// The options with the steady limits where these are tried first: they come with the regular layout, and a skeleton `drawn`
+/// elsewhere has no limits.
+pub(super) fn first(
+    options: &ReconstructOptions,
+    layout: Layout,
+    drawn: Option<&Skeleton>,
+) -> Option<ReconstructOptions> {
+    steady(options).filter(|_| layout == Layout::Auto && drawn.is_none())
+}
+
 /// The options with the steady limits; none where they are off or the user chose limits of his own. None, too, where a repair for a
 /// mould makes walls lean: their bodies have fewer quads to do that with.
-pub(super) fn steady(options: &ReconstructOptions) -> Option<ReconstructOptions> {
+fn steady(options: &ReconstructOptions) -> Option<ReconstructOptions> {
     let limits = options.retry.steady?;
     options.retry.quad_sizes.first()?;
     if options.mould.leans().is_some() {
