@@ -14,7 +14,7 @@ use crate::monitor::Monitor;
 #[cfg(feature = "occt")]
 use crate::non_design::Boss;
 use crate::non_design::Flats;
-use crate::remesh::{Bosses, Capsule};
+use crate::remesh::{Bosses, Capsule, RemeshOptions};
 use crate::report::FlatBlock;
 #[cfg(feature = "occt")]
 use grassfire_occt::Triangulation;
@@ -101,9 +101,17 @@ impl Bodies {
             margin,
         }
     }
-}
 
-impl Bodies {
+    /// The options of a remesh at a voxel, or at the default one, that keeps the free lengths of bores open.
+    pub(super) fn kept_open(&self, options: &RemeshOptions, voxel: Option<f64>) -> RemeshOptions {
+        let mut out = RemeshOptions {
+            voxel,
+            ..options.clone()
+        };
+        out.keep_open.extend(&self.bosses.free);
+        out
+    }
+
     /// Leaves recognised bodies out of a wrapped part, which follows the proposal closely anyway and whose many faces take
     /// minutes to unite, and out of one that cuts itself, which is not valid with them either.
     pub(super) fn drop_recognised(&mut self, monitor: &Monitor) {
@@ -112,9 +120,7 @@ impl Bodies {
             self.forget();
         }
     }
-}
 
-impl Bodies {
     /// Whether a flat face could not be cut though it bulges.
     pub(super) fn refuses_flats(&self, blocks: &[FlatBlock]) -> bool {
         let mut both = self.flats.faces.iter().zip(blocks);

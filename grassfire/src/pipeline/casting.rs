@@ -6,7 +6,7 @@ use super::bodies::Bodies;
 use super::deliver::Delivery;
 use super::error::{PipelineError, StageError};
 use super::record::Record;
-use super::{Outcome, ReconstructOptions, inputs};
+use super::{Outcome, ReconstructOptions, finish, inputs};
 use crate::Vec3;
 #[cfg(feature = "occt")]
 use crate::cad;
@@ -15,7 +15,7 @@ use crate::casting::solidify::{Cell, HotSpot, Solidification, solidify};
 use crate::io::{self, Input};
 use crate::mesh::{TriMesh, repair};
 use crate::monitor::Monitor;
-use crate::remesh::{RemeshOptions, Remeshed, remesh};
+use crate::remesh::{Remeshed, remesh};
 use crate::report::render::findings::findings;
 use crate::report::render::{ColourMap, Legend, section::Section, section::section};
 use crate::report::{
@@ -68,17 +68,7 @@ pub fn solidify_solid(job: &SolidJob, monitor: &Monitor) -> Result<Outcome, Pipe
     record.stage("write", || delivery.solidification(&frozen))?;
     record.report.solidify = Some(block(&frozen, &options.solidify.feeders));
     let pictures = record.stage("pictures", || sections(&frozen, &options.report))?;
-    let failed_checks = record.finish(&options.report.limits, monitor);
-    delivery
-        .report(&mut record.report, &pictures)
-        .map_err(|source| PipelineError {
-            stage: "report",
-            source,
-        })?;
-    Ok(Outcome {
-        report: record.report,
-        failed_checks,
-    })
+    finish(record, &delivery, &pictures, &options.report, monitor)
 }
 
 /// Files that `mould` writes.
@@ -114,17 +104,7 @@ pub fn mould_solid(job: &SolidJob, monitor: &Monitor) -> Result<Outcome, Pipelin
     let pictures = record.stage("pictures", || {
         sheet_pictures(&places, &mesh, &options.report)
     })?;
-    let failed_checks = record.finish(&options.report.limits, monitor);
-    delivery
-        .report(&mut record.report, &pictures)
-        .map_err(|source| PipelineError {
-            stage: "report",
-            source,
-        })?;
-    Ok(Outcome {
-        report: record.report,
-        failed_checks,
-    })
+    finish(record, &delivery, &pictures, &options.report, monitor)
 }
 
 /// The proposal without undercuts; none when no draw direction or no repair is asked for.
@@ -199,11 +179,7 @@ fn repaired(
         asked.walls = bodies.bosses.surface.clone();
     }
     let repaired = mould::repair(mesh, &draw, &asked, monitor)?;
-    let mut on_grid = RemeshOptions {
-        voxel: Some(cell),
-        ..options.remesh.clone()
-    };
-    on_grid.keep_open.extend(&bodies.bosses.free);
+    let on_grid = bodies.kept_open(&options.remesh, Some(cell));
     let solid = remesh(&repaired.mesh, &on_grid, monitor)?;
     Ok((repaired, solid))
 }

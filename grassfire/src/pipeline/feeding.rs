@@ -191,11 +191,7 @@ pub(super) fn solid_of(
     monitor: &Monitor,
 ) -> Result<Remeshed, RemeshError> {
     let h = field.spacing;
-    let mut on_grid = RemeshOptions {
-        voxel: Some(h),
-        ..options.remesh.clone()
-    };
-    on_grid.keep_open.extend(bodies.bosses.free.iter().copied());
+    let on_grid = bodies.kept_open(&options.remesh, Some(h));
     // As a density: a half at the surface.
     let density = VoxelGrid {
         values: field.values.iter().map(|f| 0.5 + f / h as f32).collect(),

@@ -12,7 +12,7 @@ use crate::Vec3;
 use crate::io::{self, Input, IoError};
 use crate::mesh::{Repair, RepairKind, RepairReport, Repaired, TriMesh, repair};
 use crate::monitor::Monitor;
-use crate::remesh::{RemeshOptions, Remeshed, remesh_density, skeleton_voxel};
+use crate::remesh::{Remeshed, remesh_density, skeleton_voxel};
 use crate::report::{InputBlock, InputFile, RepairEntry};
 use crate::skeleton::{self, Skeleton};
 use crate::voxel::VoxelGrid;
@@ -152,17 +152,11 @@ pub(super) fn remesh(
     voxel: Option<f64>,
     monitor: &Monitor,
 ) -> Result<Remeshed, StageError> {
-    let mut remesh_options = RemeshOptions {
-        voxel,
-        ..options.remesh.clone()
-    };
-    remesh_options
-        .keep_open
-        .extend(bodies.bosses.free.iter().copied());
+    let on_grid = bodies.kept_open(&options.remesh, voxel);
     Ok(match proposal {
-        Proposal::Mesh { mesh, .. } => crate::remesh::remesh(mesh, &remesh_options, monitor)?,
+        Proposal::Mesh { mesh, .. } => crate::remesh::remesh(mesh, &on_grid, monitor)?,
         Proposal::Density { grid, .. } => {
-            remesh_density(grid, options.read.threshold, &remesh_options, monitor)?
+            remesh_density(grid, options.read.threshold, &on_grid, monitor)?
         }
     })
 }
