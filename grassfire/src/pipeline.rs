@@ -1,6 +1,7 @@
 //! The whole chain, top to bottom: a proposal in, a checked CAD solid and a report out.
 //!
-//! A newcomer reads [`reconstruct`]: every stage is one call, its result one value that the next stage takes.
+//! A newcomer reads the steps at [`reconstruct`], then `rebuild`: every stage is one call, its result one value that the next
+//! stage takes.
 
 mod bodies;
 #[cfg(feature = "occt")]
@@ -31,7 +32,6 @@ mod repairs;
 mod run;
 mod score;
 mod shape;
-
 mod short_edges;
 mod sizes;
 mod steady;
@@ -287,6 +287,24 @@ fn prepared(
     })
 }
 
+/// The proposal without undercuts when they are to be taken away; notches of the bodies that this filled are closed.
+fn drawn_out(
+    record: &mut Record,
+    from: &Remeshed,
+    bodies: &mut Bodies,
+    options: &ReconstructOptions,
+    monitor: &Monitor,
+) -> Result<Option<Remeshed>, PipelineError> {
+    let repaired = casting::drawn_out(record, from, bodies, options, monitor)?;
+    #[cfg(feature = "occt")]
+    if let Some(repaired) = &repaired {
+        record.stage("mould", || {
+            notches::close(bodies, &repaired.field, options, monitor)
+        })?;
+    }
+    Ok(repaired)
+}
+
 /// The plain layout with feeders, because a body that grows does it in many fits, of few quads the better; and for noise.
 fn first_layout(options: &ReconstructOptions, noisy: bool) -> Layout {
     match options.skeleton.layout {
@@ -323,18 +341,12 @@ fn rebuild(
     } = prepared(record, job, monitor)?;
     // Undercuts last: whatever the edits did, none are left.
     let from = edited.as_ref().unwrap_or(&remeshed);
-    let repaired = casting::drawn_out(record, from, &bodies, options, monitor)?;
-    #[cfg(feature = "occt")]
-    if let Some(repaired) = &repaired {
-        record.stage("mould", || {
-            notches::close(&mut bodies, &repaired.field, options, monitor)
-        })?;
-    }
-    let (shown, original) = match (edited, repaired) {
-        (None, repaired) => (None, repaired.unwrap_or(remeshed)),
-        (Some(edited), repaired) => (Some(remeshed), repaired.unwrap_or(edited)),
+    let repaired = drawn_out(record, from, &mut bodies, options, monitor)?;
+    let (unedited, original) = match edited {
+        None => (None, repaired.unwrap_or(remeshed)),
+        Some(edited) => (Some(remeshed), repaired.unwrap_or(edited)),
     };
-    let shown = shown.as_ref().unwrap_or(&original);
+    let shown = unedited.as_ref().unwrap_or(&original);
     let placed;
     let options = if options.feed.feeders.is_empty() {
         options
@@ -396,16 +408,7 @@ fn rebuild(
             delivery.stl("edited.stl", remeshed.solid.mesh())
         })?;
     }
-    if part.non_design.is_empty() {
-        recognise::left_out(&mut record.report.candidates);
-    }
-    record.report.solid = part.block.clone();
-    if let Some(solid) = &mut record.report.solid {
-        solid.faces_deviation = shape.faces_deviation;
-    }
-    record.report.non_design = part.non_design.clone();
-    record.report.flats = part.flats.clone();
-    record.report.fillets = part.fillets.clone();
+    part.report(&mut record.report, shape.faces_deviation);
     let added = remeshed.solid.volume() - original.solid.volume();
     let feeders = feeding::poured(record, part.volume, added);
     record.report.refused = record.stage("write", || {
@@ -429,7 +432,8 @@ fn rebuild(
     feeding::prove(record, &original, &part.mesh, options, monitor)?;
     let on = (&bodies, remeshed.field.spacing);
     casting::mould_of(record, &part.mesh, on, &options.mould, monitor)?;
-    let mut pictures = record.stage("pictures", || {
+    let places = casting::sheet_places(record);
+    let pictures = record.stage("pictures", || {
         let stages = illustrate::Stages {
             remeshed,
             poles: &poles,
@@ -438,12 +442,14 @@ fn rebuild(
             part: &part,
             non_design: &bodies,
         };
-        illustrate::pictures(&stages, &options.report, monitor)
+        let mut pictures = illustrate::pictures(&stages, &options.report, monitor)?;
+        pictures.extend(casting::sheet_pictures(
+            &places,
+            &part.mesh,
+            &options.report,
+        )?);
+        Ok::<_, StageError>(pictures)
     })?;
-    let places = casting::sheet_places(record);
-    pictures.extend(record.stage("pictures", || {
-        casting::sheet_pictures(&places, &part.mesh, &options.report)
-    })?);
     Ok(Rebuilt {
         delivery,
         pictures,

@@ -5,6 +5,7 @@ use super::bodies::Bodies;
 use super::error::StageError;
 #[cfg(feature = "occt")]
 use super::exchange::Format;
+use super::recognise;
 use super::shape::Surface;
 #[cfg(feature = "occt")]
 use crate::Vec3;
@@ -18,7 +19,7 @@ use crate::monitor::Monitor;
 use crate::non_design::Flat;
 #[cfg(feature = "occt")]
 use crate::report::BoreBlock;
-use crate::report::{FilletBlock, FlatBlock, NonDesignBlock, SolidBlock};
+use crate::report::{FilletBlock, FlatBlock, NonDesignBlock, Report, SolidBlock};
 #[cfg(not(feature = "occt"))]
 use crate::spline::Crowded;
 use crate::topology::Betti;
@@ -48,6 +49,21 @@ pub(super) struct Part {
 pub(super) const CHORD: f64 = 0.05;
 
 impl Part {
+    /// Puts the entries of solid and bodies into the report. `faces_deviation` is how far the surface moved for the sake of fewer
+    /// faces, mm.
+    pub(super) fn report(&self, report: &mut Report, faces_deviation: Option<f64>) {
+        if self.non_design.is_empty() {
+            recognise::left_out(&mut report.candidates);
+        }
+        report.solid = self.block.clone();
+        if let Some(solid) = &mut report.solid {
+            solid.faces_deviation = faces_deviation;
+        }
+        report.non_design.clone_from(&self.non_design);
+        report.flats.clone_from(&self.flats);
+        report.fillets.clone_from(&self.fillets);
+    }
+
     /// What speaks against this part of topology `wanted`, when anything does.
     pub(super) fn problem(&self, wanted: &Betti) -> Option<String> {
         let block = self.block.as_ref()?;
