@@ -2,13 +2,12 @@
 
 use super::goal::{Figures, Goal};
 use super::tangles::Tangles;
-use super::targets::IsoSamples;
+use super::targets::Target;
 use super::{FitError, FitOptions, Fitted, STAGE, refine, round, settle, surface, untangle};
 use crate::Vec3;
 use crate::monitor::Monitor;
 use crate::skeleton::Skeleton;
 use crate::thicken::ThickenedBody;
-use crate::voxel::VoxelGrid;
 
 /// A fit from one start, and how good it is.
 pub(super) struct Attempt {
@@ -37,19 +36,18 @@ impl Attempt {
 pub(super) fn attempt(
     body: &ThickenedBody,
     skeleton: &Skeleton,
-    field: &VoxelGrid<f32>,
-    iso: &IsoSamples,
-    iso_volume: f64,
+    target: &Target,
     options: &FitOptions,
     monitor: &Monitor,
 ) -> Result<Attempt, FitError> {
     monitor.step(STAGE, "operators", 0.0)?;
+    let field = target.field;
     let surface = surface::Surface::new(body, field)?;
     let thickened: Vec<Vec3> = body.mesh.points.iter().map(|p| field.to_grid(p)).collect();
     let mut points = surface.damped_start(&thickened)?;
-    let mut solver = round::Solver::new(surface, field, iso, options)?;
+    let mut solver = round::Solver::new(surface, field, &target.iso, options)?;
     let mut fitted = Fitted {
-        iso_volume,
+        iso_volume: target.volume,
         ..Fitted::default()
     };
     for round in 0..options.rounds {
@@ -72,14 +70,13 @@ pub(super) fn attempt(
 pub(super) fn settled(
     fitted: &Fitted,
     skeleton: &Skeleton,
-    field: &VoxelGrid<f32>,
-    iso: &IsoSamples,
-    iso_volume: f64,
+    target: &Target,
     options: &FitOptions,
     monitor: &Monitor,
 ) -> Result<Attempt, FitError> {
+    let field = target.field;
     let surface = surface::Surface::new(&fitted.body, field)?;
-    let solver = round::Solver::new(surface, field, iso, options)?;
+    let solver = round::Solver::new(surface, field, &target.iso, options)?;
     let placed = fitted.mesh.points.iter().map(|p| field.to_grid(p));
     let points: Vec<Vec3> = placed.collect();
     let tangles = Tangles::of(&solver, &points);
@@ -90,7 +87,7 @@ pub(super) fn settled(
         tangles,
     };
     let fitted = Fitted {
-        iso_volume,
+        iso_volume: target.volume,
         ..fitted.clone()
     };
     finished(state, fitted, skeleton, options, monitor)

@@ -7,6 +7,7 @@ mod equations;
 mod goal;
 mod guard;
 mod lean;
+mod options;
 mod raise;
 mod refine;
 mod residual;
@@ -22,11 +23,11 @@ mod volume;
 
 pub use clearance::clear_of;
 pub use lean::leaned;
+pub use options::FitOptions;
 pub use raise::raised;
 pub use volume::volume;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Vec3;
 use crate::monitor::{Cancelled, Monitor};
@@ -51,73 +52,6 @@ const MANY_QUADS: usize = 4000;
 
 /// Quads of a body that settles on a finer field, over those it had: a field is finer by less than the square root of 2.
 const MORE: f64 = std::f64::consts::SQRT_2;
-
-/// Options of [`fit`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct FitOptions {
-    /// Starts with nets of different evenness, at most; the best is kept. There is a second one only if the first was sound
-    /// but did not meet the goal, and the body has at most 2000 quads; a third one only if a place is still farther off than
-    /// ten times the goal, and the body has at most 1333 quads.
-    pub starts: u32,
-    /// Gauss-Newton rounds against the iso-surface.
-    pub rounds: u32,
-    /// Weight of the fairness (bending) against the data once the fit has settled. It starts at 1
-    /// and falls by 0.6 a round.
-    pub fairness: f64,
-    /// Samples of the iso-surface that pull the limit surface.
-    pub iso_samples: usize,
-    /// Largest move of a control point in a round, voxels.
-    pub max_step: f64,
-    /// Weight of tangential evenness of the net against the data. It spreads the control points over
-    /// the surface and hardly moves the surface itself.
-    pub evenness: f64,
-    /// Patches whose smallest normalised Jacobian is below this count as folded; untangling aims at
-    /// twice this.
-    pub fold_limit: f64,
-    /// Times that strips of quads are split where the mesh is too coarse for the proposal, at most; 0 keeps the quads.
-    pub refinements: u32,
-    /// Refined meshes have at most this many times the quads.
-    pub most_quads: f64,
-    /// Refinement ends when the rms distance is below this, 95 % below twice and everything below eight times this,
-    /// voxels.
-    pub goal: f64,
-    /// Last rounds at the proposal's volume, for bodies that do not cut themselves.
-    pub settle_rounds: u32,
-    /// The proposal's volume, mm3. Default: that of f > 0, whose edges are blunt.
-    pub volume: Option<f64>,
-    /// Largest number of unfolding rounds; 0 switches untangling off.
-    pub untangle_rounds: u32,
-    /// Rounds that give back what untangling took, without new intersections.
-    pub regrow_rounds: u32,
-    /// Untangling may lower the volume by at most this fraction.
-    pub max_volume_loss: f64,
-    /// Untangling may raise the rms distance by at most this fraction.
-    pub max_rms_growth: f64,
-}
-
-impl Default for FitOptions {
-    fn default() -> Self {
-        Self {
-            starts: 2,
-            rounds: 16,
-            fairness: 0.02,
-            iso_samples: 20_000,
-            max_step: 4.0,
-            evenness: 0.01,
-            fold_limit: 0.05,
-            refinements: 3,
-            most_quads: 3.0,
-            goal: 0.15,
-            settle_rounds: 6,
-            volume: None,
-            untangle_rounds: 12,
-            regrow_rounds: 10,
-            max_volume_loss: 0.01,
-            max_rms_growth: 0.5,
-        }
-    }
-}
 
 /// How one round went.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -319,10 +253,9 @@ pub fn fit(
     options: &FitOptions,
     monitor: &Monitor,
 ) -> Result<Fitted, FitError> {
-    check_options(options)?;
-    check_input(body, skeleton, field)?;
-    let iso = targets::iso_samples(field, options.iso_samples)?;
-    let iso_volume = options.volume.unwrap_or_else(|| volume(field));
+    options::check(options)?;
+    check_body(body, skeleton)?;
+    let target = targets::Target::new(field, options)?;
     let mut best: Option<attempt::Attempt> = None;
     let affordable = (MANY_QUADS / body.mesh.quads.len().max(1)).max(1);
     let mut starts = 0;
@@ -334,7 +267,7 @@ pub fn fit(
             evenness: options.evenness * calm,
             ..*options
         };
-        let tried = attempt::attempt(body, skeleton, field, &iso, iso_volume, &calmer, monitor)?;
+        let tried = attempt::attempt(body, skeleton, &target, &calmer, monitor)?;
         starts += 1;
         // Another start does not untangle a body; quads of another size do.
         let ended = tried.met || !tried.sound;
@@ -366,16 +299,14 @@ pub fn settled(
     options: &FitOptions,
     monitor: &Monitor,
 ) -> Result<Fitted, FitError> {
-    check_options(options)?;
-    check_field(field)?;
-    let iso = targets::iso_samples(field, options.iso_samples)?;
-    let iso_volume = options.volume.unwrap_or_else(|| volume(field));
+    options::check(options)?;
+    let target = targets::Target::new(field, options)?;
     let options = FitOptions {
         refinements: options.refinements.min(1),
         most_quads: options.most_quads.min(MORE),
         ..*options
     };
-    let settled = attempt::settled(fitted, skeleton, field, &iso, iso_volume, &options, monitor)?;
+    let settled = attempt::settled(fitted, skeleton, &target, &options, monitor)?;
     Ok(settled.fitted)
 }
 
@@ -398,91 +329,8 @@ fn report(fitted: &Fitted, monitor: &Monitor) {
     }
 }
 
-fn check_options(options: &FitOptions) -> Result<(), FitError> {
-    let inside = |name, value: f64, lo: f64, hi: f64, allowed| {
-        if value.is_finite() && value >= lo && value <= hi {
-            Ok(())
-        } else {
-            Err(FitError::BadOption {
-                name,
-                value,
-                allowed,
-            })
-        }
-    };
-    inside("starts", f64::from(options.starts), 1.0, 3.0, "1 to 3")?;
-    inside("rounds", f64::from(options.rounds), 0.0, 200.0, "0 to 200")?;
-    inside(
-        "regrow_rounds",
-        f64::from(options.regrow_rounds),
-        0.0,
-        200.0,
-        "0 to 200",
-    )?;
-    inside(
-        "untangle_rounds",
-        f64::from(options.untangle_rounds),
-        0.0,
-        200.0,
-        "0 to 200",
-    )?;
-    inside(
-        "refinements",
-        f64::from(options.refinements),
-        0.0,
-        20.0,
-        "0 to 20",
-    )?;
-    inside("most_quads", options.most_quads, 1.0, 100.0, "1 to 100")?;
-    inside("goal", options.goal, 0.0, 100.0, "0 to 100 voxels")?;
-    inside(
-        "settle_rounds",
-        f64::from(options.settle_rounds),
-        0.0,
-        200.0,
-        "0 to 200",
-    )?;
-    let volume = options.volume.unwrap_or(1.0);
-    inside("volume", volume, 1e-9, 1e18, "a positive volume")?;
-    inside("evenness", options.evenness, 0.0, 100.0, "0 to 100")?;
-    inside("fold_limit", options.fold_limit, 0.0, 0.4, "0 to 0.4")?;
-    inside("fairness", options.fairness, 1e-6, 1e3, "1e-6 to 1000")?;
-    inside(
-        "iso_samples",
-        options.iso_samples as f64,
-        0.0,
-        1e7,
-        "at most 10 million",
-    )?;
-    inside(
-        "max_step",
-        options.max_step,
-        1e-3,
-        1e3,
-        "0.001 to 1000 voxels",
-    )?;
-    inside(
-        "max_volume_loss",
-        options.max_volume_loss,
-        0.0,
-        1.0,
-        "0 to 1",
-    )?;
-    inside(
-        "max_rms_growth",
-        options.max_rms_growth,
-        0.0,
-        100.0,
-        "0 to 100",
-    )
-}
-
-fn check_input(
-    body: &ThickenedBody,
-    skeleton: &Skeleton,
-    field: &VoxelGrid<f32>,
-) -> Result<(), FitError> {
-    check_field(field)?;
+/// Refuses a body that is not of the skeleton.
+fn check_body(body: &ThickenedBody, skeleton: &Skeleton) -> Result<(), FitError> {
     for (i, p) in body.mesh.points.iter().enumerate() {
         let source = body.source.get(i).copied().unwrap_or(u32::MAX);
         if source as usize >= skeleton.points.len()
@@ -493,20 +341,6 @@ fn check_input(
                 source_point: source,
             });
         }
-    }
-    Ok(())
-}
-
-fn check_field(field: &VoxelGrid<f32>) -> Result<(), FitError> {
-    let [nx, ny, nz] = field.dims;
-    let count = nx.checked_mul(ny).and_then(|n| n.checked_mul(nz));
-    let placed = field.spacing > 0.0
-        && field.spacing.is_finite()
-        && field.origin.iter().all(|x| x.is_finite());
-    let finite = field.values.iter().all(|f| f.is_finite());
-    if count != Some(field.values.len()) || field.dims.iter().any(|&n| n < 2) || !placed || !finite
-    {
-        return Err(FitError::BadField { dims: field.dims });
     }
     Ok(())
 }

@@ -1,8 +1,42 @@
 //! Where the surface should go: the field in voxel units, samples of f = 0, and nearest samples.
 
-use super::FitError;
+use super::{FitError, FitOptions, volume};
 use crate::Vec3;
 use crate::voxel::VoxelGrid;
+
+/// What every start of the fit goes to.
+pub(super) struct Target<'a> {
+    pub field: &'a VoxelGrid<f32>,
+    pub iso: IsoSamples,
+    /// The volume wanted, mm3.
+    pub volume: f64,
+}
+
+impl<'a> Target<'a> {
+    pub fn new(field: &'a VoxelGrid<f32>, options: &FitOptions) -> Result<Self, FitError> {
+        check(field)?;
+        Ok(Self {
+            field,
+            iso: iso_samples(field, options.iso_samples)?,
+            volume: options.volume.unwrap_or_else(|| volume(field)),
+        })
+    }
+}
+
+/// Refuses a field whose values are not finite or not as many as its voxels.
+fn check(field: &VoxelGrid<f32>) -> Result<(), FitError> {
+    let [nx, ny, nz] = field.dims;
+    let count = nx.checked_mul(ny).and_then(|n| n.checked_mul(nz));
+    let placed = field.spacing > 0.0
+        && field.spacing.is_finite()
+        && field.origin.iter().all(|x| x.is_finite());
+    let finite = field.values.iter().all(|f| f.is_finite());
+    if count != Some(field.values.len()) || field.dims.iter().any(|&n| n < 2) || !placed || !finite
+    {
+        return Err(FitError::BadField { dims: field.dims });
+    }
+    Ok(())
+}
 
 /// Samples of the iso-surface in voxel units.
 #[derive(Debug, Clone, Default)]
@@ -46,7 +80,7 @@ pub(super) fn flow_to_surface(field: &VoxelGrid<f32>, p: &Vec3, steps: u32) -> (
 }
 
 /// One point a cell that f = 0 passes (mean of the crossings of its edges), thinned to about `limit`.
-pub(super) fn iso_samples(field: &VoxelGrid<f32>, limit: usize) -> Result<IsoSamples, FitError> {
+fn iso_samples(field: &VoxelGrid<f32>, limit: usize) -> Result<IsoSamples, FitError> {
     let [nx, ny, nz] = field.dims;
     let mut cells = Vec::new();
     for k in 0..nz - 1 {
