@@ -13,6 +13,7 @@ pub mod papers;
 mod recognised;
 pub mod render;
 mod repairs;
+mod results;
 mod shape;
 mod verification;
 
