@@ -1,14 +1,15 @@
 //! From the B-rep description and the non-design bodies to one checked solid.
 
-use grassfire_occt::{BrepDescription, OcctError, Shape};
+use grassfire_occt::Shape;
 
 use super::beside::{disjoint, free_bores, near, side_by_side, tool};
+use super::body::{Body, Built, single};
 use super::bores::Bore;
 use super::inspect::{self, NonDesignResult};
 use super::non_design::NonDesignBody;
 use super::reference::{self, Probe};
-use super::unite::{ATTEMPTS, Booleans, Inputs, Kernel, booleans, kernel, shift};
-use super::{CadError, CadOptions, array, patches, shells, split};
+use super::unite::{ATTEMPTS, Booleans, Inputs, Kernel, United, booleans, kernel, shift};
+use super::{CadError, CadOptions, split};
 use crate::Vec3;
 use crate::monitor::Monitor;
 use crate::spline::{Brep, Crowded};
@@ -211,7 +212,7 @@ pub(super) fn finish_with(
 ) -> Result<CadSolid, CadError> {
     let Joined {
         body,
-        bores: bodies_holes,
+        bores,
         tools,
         union,
     } = joined;
@@ -254,18 +255,7 @@ pub(super) fn finish_with(
         monitor.check()?;
         match outcome {
             Ok(united) => {
-                monitor.step(STAGE, "inspecting", 0.8)?;
-                let sources = inspect::sources(&united.mesh_shape, &united.kinds, &context)?;
-                let made = inspect::Made {
-                    shape: united.shape,
-                    organic: united.organic,
-                    sources,
-                    checked: Some(united.volume),
-                };
-                let mut solid = inspect::report(made, Vec::new(), true, &context, monitor)?;
-                for (result, bores) in solid.non_design.iter_mut().zip(&bodies_holes) {
-                    result.bores.clone_from(bores);
-                }
+                let mut solid = inspected(united, &bores, &context, monitor)?;
                 if !messages.is_empty() {
                     solid
                         .messages
@@ -305,6 +295,27 @@ pub(super) fn finish_with(
         &still.context(bodies, options),
         monitor,
     )
+}
+
+/// A union that passed its checks, inspected; its bodies' bores with the length over which they were cut.
+fn inspected(
+    united: United,
+    bores: &[Vec<Bore>],
+    context: &inspect::Context,
+    monitor: &Monitor,
+) -> Result<CadSolid, CadError> {
+    monitor.step(STAGE, "inspecting", 0.8)?;
+    let made = inspect::Made {
+        sources: inspect::sources(&united.mesh_shape, &united.kinds, context)?,
+        shape: united.shape,
+        organic: united.organic,
+        checked: Some(united.volume),
+    };
+    let mut solid = inspect::report(made, Vec::new(), true, context, monitor)?;
+    for (result, bores) in solid.non_design.iter_mut().zip(bores) {
+        result.bores.clone_from(bores);
+    }
+    Ok(solid)
 }
 
 /// The fitted body alone, or beside the non-design bodies when it is not sound.
@@ -394,116 +405,4 @@ fn badness(solid: &CadSolid) -> (usize, f64) {
     let lost = solid.non_design.iter().filter(|body| !body.kept).count();
     let distance = solid.non_design.iter().map(|body| body.max_distance);
     (lost, distance.fold(0.0, f64::max))
-}
-
-/// The fitted body's solids, not checked.
-struct Built {
-    shape: Shape,
-    solids: u32,
-}
-
-/// The fitted body as solids.
-pub(super) struct Body {
-    pub(super) shape: Shape,
-    pub(super) solids: u32,
-    pub(super) volume: f64,
-    /// What each face adds to the volume, mm3; empty when the shape was moved since.
-    pub(super) face_volumes: Vec<f64>,
-    pub(super) problems: Vec<String>,
-}
-
-impl Built {
-    fn new(brep: &Brep) -> Result<Self, CadError> {
-        patches::check(brep).map_err(|text| CadError::BadBrep { text })?;
-        let solids = shells::classify(brep)?;
-        Ok(Self {
-            shape: Shape::from_brep(&describe(brep, &solids))?,
-            solids: solids.len() as u32,
-        })
-    }
-
-    /// What the kernel, the edges' faces and the volume say of it.
-    fn checked(self, brep: &Brep) -> Result<Body, CadError> {
-        let Self { shape, solids } = self;
-        let face_volumes = shape.face_volumes(VOLUME_EPS, None)?;
-        let volume = face_volumes.iter().sum::<f64>();
-        let mut problems = Vec::new();
-        if let Some(text) = shape.faults()? {
-            problems.push(format!("the fitted body is not valid: {text}"));
-        }
-        let counts = shape.counts()?;
-        if counts.bad_edges > 0 {
-            problems.push(format!(
-                "{} edges of the fitted body have not exactly two faces",
-                counts.bad_edges
-            ));
-        }
-        let difference = (volume - brep.volume).abs() / brep.volume.abs();
-        if difference.is_nan() || difference > IDENTITY {
-            problems.push(format!(
-                "the fitted body has {volume:.6} mm3, its patches {:.6} mm3",
-                brep.volume
-            ));
-        }
-        Ok(Body {
-            shape,
-            solids,
-            volume,
-            face_volumes,
-            problems,
-        })
-    }
-}
-
-impl Body {
-    /// Volume of a shape made from this body by booleans, mm3: faces that they left alone keep what they add.
-    pub(super) fn volume_of(&self, shape: &Shape) -> Result<f64, OcctError> {
-        let known = Some((&self.shape, self.face_volumes.as_slice()));
-        Ok(shape.face_volumes(VOLUME_EPS, known)?.iter().sum())
-    }
-}
-
-fn describe(brep: &Brep, solids: &[Vec<usize>]) -> BrepDescription {
-    let flat = |points: &[Vec3]| points.iter().flat_map(|p| array(*p)).collect::<Vec<f64>>();
-    BrepDescription {
-        vertices: flat(&brep.vertices),
-        edges: brep
-            .edges
-            .iter()
-            .flat_map(|e| [e.vertices[0], e.vertices[1], e.spans])
-            .collect(),
-        edge_control: brep.edges.iter().flat_map(|e| flat(&e.control)).collect(),
-        faces: brep
-            .faces
-            .iter()
-            .flat_map(|f| [f.spans[0], f.spans[1], f.uses.len() as u32])
-            .collect(),
-        face_control: brep.faces.iter().flat_map(|f| flat(&f.control)).collect(),
-        uses: brep
-            .faces
-            .iter()
-            .flat_map(|f| &f.uses)
-            .flat_map(|u| [u.edge, u32::from(u.reversed)])
-            .collect(),
-        use_uv: brep
-            .faces
-            .iter()
-            .flat_map(|f| &f.uses)
-            .flat_map(|u| [u.start[0], u.start[1], u.end[0], u.end[1]])
-            .collect(),
-        solids: solids
-            .iter()
-            .map(|s| s.iter().map(|&k| brep.shells[k].clone()).collect())
-            .collect(),
-    }
-}
-
-/// A compound of one solid is that solid.
-pub(super) fn single(shape: Shape) -> Result<Shape, OcctError> {
-    let mut solids = shape.solids()?;
-    Ok(if solids.len() == 1 {
-        solids.swap_remove(0)
-    } else {
-        shape
-    })
 }

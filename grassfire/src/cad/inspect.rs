@@ -4,7 +4,7 @@ use grassfire_occt::{Counts, Edge, Face, OcctError, Shape};
 use serde::Serialize;
 
 use super::bores::{Bore, ON_WALL};
-use super::build::{CadSolid, FaceSource};
+use super::build::{CadSolid, FaceSource, VOLUME_EPS};
 use super::non_design::NonDesignBody;
 use super::reference::Probe;
 use super::unite::Kind;
@@ -179,7 +179,6 @@ pub(crate) fn report(
         sources,
         checked,
     } = made;
-    let counts = shape.counts()?;
     let volume = match checked {
         Some(volume) => volume,
         None => {
@@ -187,24 +186,21 @@ pub(crate) fn report(
                 valid = false;
                 messages.push(format!("BRepCheck: {text}"));
             }
-            shape.volume(1e-8)?
+            shape.volume(VOLUME_EPS)?
         }
     };
-    let edges = shape.edges()?;
-    let g1_max = kink(&edges, &sources);
+    let (mut solid, faces) = measured(shape, organic, sources, volume)?;
     monitor.check()?;
-    let mut non_design = Vec::with_capacity(context.bodies.len());
-    let faces = shape.faces()?;
     let open = if context.probes.is_empty() {
         Vec::new()
     } else {
-        bores_open(&shape, context.bodies)?
+        bores_open(&solid.shape, context.bodies)?
     };
     for (b, body) in context.bodies.iter().enumerate() {
         let result = if context.probes.is_empty() {
             separate(body)
         } else {
-            united(&shape, &faces, &sources, b, open[b], context)?
+            united(&solid, &faces, b, open[b], context)?
         };
         if !result.kept {
             valid = false;
@@ -215,7 +211,7 @@ pub(crate) fn report(
                 100.0 * result.coverage
             ));
         }
-        non_design.push(result);
+        solid.non_design.push(result);
     }
     for (probe, body) in context.probes.iter().zip(context.bodies) {
         if probe.overlap <= 1e-6 * probe.region {
@@ -225,21 +221,38 @@ pub(crate) fn report(
     }
     Ok(CadSolid {
         valid,
+        volume_check: (volume - context.reference).abs() / context.reference.abs(),
+        messages,
+        ..solid
+    })
+}
+
+/// What is counted and measured on a shape of `volume` mm3 alone, and its faces. Checks, messages and bodies are left open.
+fn measured(
+    shape: Shape,
+    organic: Shape,
+    sources: Vec<FaceSource>,
+    volume: f64,
+) -> Result<(CadSolid, Vec<Face>), OcctError> {
+    let (edges, faces, counts) = (shape.edges()?, shape.faces()?, shape.counts()?);
+    let solid = CadSolid {
+        valid: false,
         organic,
         bodies: counts.solids as usize,
         faces: counts.faces as usize,
         volume,
         area: faces.iter().map(|face| face.area).sum(),
         genus: genus(&counts),
-        g1_max,
+        g1_max: kink(&edges, &sources),
         shortest_edge: shortest(&edges).unwrap_or(0.0),
         max_tolerance: shape.max_tolerance()?,
-        volume_check: (volume - context.reference).abs() / context.reference.abs(),
-        non_design,
+        volume_check: f64::NAN,
+        non_design: Vec::new(),
         sources,
-        messages,
+        messages: Vec::new(),
         shape,
-    })
+    };
+    Ok((solid, faces))
 }
 
 /// Measures a part anew after cuts of which each was checked: `shape` of `volume` mm3 with one source a face.
@@ -257,30 +270,18 @@ pub(crate) fn again(
         probes: &[],
         reference: volume,
     };
-    let (edges, faces, counts) = (shape.edges()?, shape.faces()?, shape.counts()?);
-    let open = bores_open(&shape, bodies)?;
-    let mut non_design = Vec::with_capacity(bodies.len());
+    let (mut solid, faces) = measured(shape, before.organic.share()?, sources, volume)?;
+    let open = bores_open(&solid.shape, bodies)?;
     for (b, old) in before.non_design.iter().enumerate() {
-        let mut result = united(&shape, &faces, &sources, b, open[b], &context)?;
+        let mut result = united(&solid, &faces, b, open[b], &context)?;
         result.bores.clone_from(&old.bores);
-        non_design.push(result);
+        solid.non_design.push(result);
     }
     Ok(CadSolid {
         valid: before.valid,
-        organic: before.organic.share()?,
-        bodies: counts.solids as usize,
-        faces: counts.faces as usize,
-        volume,
-        area: faces.iter().map(|face| face.area).sum(),
-        genus: genus(&counts),
-        g1_max: kink(&edges, &sources),
-        shortest_edge: shortest(&edges).unwrap_or(0.0),
-        max_tolerance: shape.max_tolerance()?,
         volume_check: before.volume_check,
-        non_design,
-        sources,
         messages: before.messages.clone(),
-        shape,
+        ..solid
     })
 }
 
@@ -306,6 +307,7 @@ pub(super) fn shortest(edges: &[Edge]) -> Option<f64> {
     edges.iter().map(|edge| edge.length).reduce(f64::min)
 }
 
+/// A body that lies beside the part.
 fn separate(body: &NonDesignBody) -> NonDesignResult {
     NonDesignResult {
         name: body.name.clone(),
@@ -319,17 +321,18 @@ fn separate(body: &NonDesignBody) -> NonDesignResult {
     }
 }
 
+/// How body `b` came out in a solid of these faces.
 fn united(
-    shape: &Shape,
+    solid: &CadSolid,
     faces: &[Face],
-    sources: &[FaceSource],
     b: usize,
     open: bool,
     context: &Context,
 ) -> Result<NonDesignResult, CadError> {
     let body = &context.bodies[b];
+    let shape = &solid.shape;
     let (mut own, mut walls) = (Vec::new(), Vec::new());
-    for (f, source) in sources.iter().enumerate() {
+    for (f, source) in solid.sources.iter().enumerate() {
         match *source {
             FaceSource::Body(i) if i as usize == b => own.push(f as u32),
             FaceSource::Bore(i, k) if i as usize == b => walls.push((f as u32, k as usize)),

@@ -15,6 +15,8 @@ pub mod primitives;
 #[cfg(feature = "occt")]
 mod beside;
 #[cfg(feature = "occt")]
+mod body;
+#[cfg(feature = "occt")]
 mod bores;
 #[cfg(feature = "occt")]
 mod build;

@@ -4,7 +4,8 @@ use std::time::Instant;
 
 use grassfire_occt::{BooleanResult, OcctError, Operation, Origin, Shape};
 
-use super::build::{CadSolid, FaceSource, IDENTITY, VOLUME_EPS, single};
+use super::body::single;
+use super::build::{CadSolid, FaceSource, IDENTITY, VOLUME_EPS};
 use super::inspect;
 use super::non_design::NonDesignBody;
 use super::{CadError, CadOptions, prism};

@@ -5,7 +5,8 @@ use std::time::Instant;
 use grassfire_occt::{BooleanResult, OcctError, Operation, Origin, Shape};
 use rayon::prelude::*;
 
-use super::build::{Body, IDENTITY, VOLUME_EPS, single};
+use super::body::{Body, single};
+use super::build::{IDENTITY, VOLUME_EPS};
 use super::reference::{self, Probe};
 use super::{CadOptions, array, inspect};
 use crate::Vec3;
