@@ -64,7 +64,7 @@ pub use {
     inspect::NonDesignResult,
     non_design::{
         DesignSpace, NonDesignBody, Rebuilt, SpaceBore, from_boss, from_mesh, from_shape, read,
-        read_design_space,
+        read_design_space, read_surface,
     },
     output::{
         ORGANIC_PIECE, piece_name, tessellate, tessellate_solids, write_brep, write_iges,

@@ -230,6 +230,25 @@ pub struct SpaceBore {
     pub faces: Vec<u32>,
 }
 
+/// The surface of all solids of a STEP file that [`read`] takes: triangles within `chord` mm, facets that turn by up to `angle`.
+///
+/// # Errors
+/// As [`read`], and [`CadError::Kernel`].
+pub fn read_surface(
+    path: &Path,
+    (chord, angle): (f64, f64),
+    options: &NonDesignOptions,
+    monitor: &Monitor,
+) -> Result<TriMesh, CadError> {
+    let mut out = TriMesh::default();
+    for body in read(path, options, monitor)? {
+        let mesh = body.solid.tessellate(chord, angle)?;
+        let points = mesh.points.iter().map(|p| Vec3::from(*p));
+        out.append(points, mesh.triangles);
+    }
+    Ok(out)
+}
+
 /// Reads the faces of a design space from STEP, triangles within `chord` mm of them.
 ///
 /// # Errors

@@ -324,19 +324,11 @@ pub(super) fn read(
 #[cfg(feature = "occt")]
 fn step(path: &Path, _key: &str, scale: f64, monitor: &Monitor) -> Result<TriMesh, CaseError> {
     /// Chord (mm) and facet angle (radians).
-    const CHORD: f64 = 0.02;
-    const FACET: f64 = 0.2;
-    let bodies = crate::cad::read(path, &crate::cad::NonDesignOptions::default(), monitor)?;
-    let mut out = TriMesh::default();
-    for body in bodies {
-        let mesh = body
-            .solid
-            .tessellate(CHORD, FACET)
-            .map_err(crate::cad::CadError::from)?;
-        let points = mesh.points.iter().map(|p| Vec3::from(*p) * scale);
-        out.append(points, mesh.triangles.iter().copied());
-    }
-    Ok(out)
+    const FINE: (f64, f64) = (0.02, 0.2);
+    let options = crate::cad::NonDesignOptions::default();
+    let mut mesh = crate::cad::read_surface(path, FINE, &options, monitor)?;
+    mesh.points.iter_mut().for_each(|p| *p *= scale);
+    Ok(mesh)
 }
 
 #[cfg(not(feature = "occt"))]

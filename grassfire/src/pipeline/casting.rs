@@ -311,9 +311,7 @@ pub(super) fn solid(job: &SolidJob, monitor: &Monitor) -> Result<TriMesh, StageE
 
 /// Chord (mm) and facet angle (radians) of a STEP solid's triangles.
 #[cfg(feature = "occt")]
-const CHORD: f64 = 0.05;
-#[cfg(feature = "occt")]
-const FACET: f64 = 0.3;
+const FINE: (f64, f64) = (0.05, 0.3);
 
 #[cfg(feature = "occt")]
 fn step(
@@ -321,16 +319,12 @@ fn step(
     options: &ReconstructOptions,
     monitor: &Monitor,
 ) -> Result<TriMesh, StageError> {
-    let mut mesh = TriMesh::default();
-    for body in cad::read(&path, &options.non_design, monitor)? {
-        let triangles = body
-            .solid
-            .tessellate(CHORD, FACET)
-            .map_err(cad::CadError::from)?;
-        let points = triangles.points.iter().map(|p| Vec3::from(*p));
-        mesh.append(points, triangles.triangles.iter().copied());
-    }
-    Ok(mesh)
+    Ok(cad::read_surface(
+        &path,
+        FINE,
+        &options.non_design,
+        monitor,
+    )?)
 }
 
 #[cfg(not(feature = "occt"))]
