@@ -10,16 +10,17 @@
 #![deny(unsafe_op_in_unsafe_fn)]
 
 mod ffi;
+mod files;
 mod step_text;
 mod types;
 
 use std::fmt;
-use std::path::Path;
 use std::sync::{Mutex, MutexGuard, Once};
 
 use cxx::UniquePtr;
 use ffi::bridge;
 pub use ffi::bridge::Counts;
+pub use files::step_contents;
 pub use types::{
     BooleanResult, BrepDescription, Edge, Face, FilletResult, Line, Operation, Origin,
     StepContents, StepTexts, Surface, Triangulation,
@@ -168,59 +169,6 @@ impl Shape {
             bridge::add_to_compound(out.0.pin_mut(), &part.0)?;
         }
         Ok(out)
-    }
-
-    /// Reads a STEP file; units become mm. Cut off files and dangling references are found before the kernel sees them.
-    pub fn read_step(path: &Path) -> Result<Self> {
-        let text = path_text(path)?;
-        let bytes = std::fs::read(path).map_err(|e| OcctError(e.to_string()))?;
-        step_text::check(&bytes).map_err(OcctError)?;
-        Self::make(|| bridge::read_step(text))
-    }
-
-    /// Writes STEP AP242 in mm with product structure, names and colours. Equal shapes and texts give equal files but for
-    /// the time stamp.
-    pub fn write_step(&self, path: &Path, texts: &StepTexts) -> Result<()> {
-        let names = texts.bridge(self.max_tolerance()?, step_text::line);
-        let name = path_text(path)?;
-        {
-            let _guard = lock();
-            bridge::write_step(&self.0, name, &names)?;
-        }
-        let failed = |e: std::io::Error| OcctError(e.to_string());
-        let text = std::fs::read(path).map_err(failed)?;
-        if text.is_ascii() {
-            return Ok(());
-        }
-        let text = String::from_utf8_lossy(&text);
-        std::fs::write(path, step_text::encode(&text)).map_err(failed)
-    }
-
-    /// Writes OpenCASCADE's own format, without names.
-    pub fn write_brep(&self, path: &Path) -> Result<()> {
-        let path = path_text(path)?;
-        let _guard = lock();
-        Ok(bridge::write_brep(&self.0, path)?)
-    }
-
-    /// Reads OpenCASCADE's own format.
-    pub fn read_brep(path: &Path) -> Result<Self> {
-        let path = path_text(path)?;
-        Self::make(|| bridge::read_brep(path))
-    }
-
-    /// Writes IGES 5.3 in mm: manifold solids, without names of faces.
-    pub fn write_iges(&self, path: &Path, texts: &StepTexts) -> Result<()> {
-        let names = texts.bridge(self.max_tolerance()?, step_text::ascii);
-        let path = path_text(path)?;
-        let _guard = lock();
-        Ok(bridge::write_iges(&self.0, path, &names)?)
-    }
-
-    /// Reads an IGES file; units become mm.
-    pub fn read_iges(path: &Path) -> Result<Self> {
-        let path = path_text(path)?;
-        Self::make(|| bridge::read_iges(path))
     }
 
     /// Another handle on the same geometry.
@@ -481,20 +429,6 @@ impl Shape {
             faces: flat.faces,
         })
     }
-}
-
-/// Names and colours of the products, solids and faces of a STEP file.
-pub fn step_contents(path: &Path) -> Result<StepContents> {
-    let text = path_text(path)?;
-    let bytes = std::fs::read(path).map_err(|e| OcctError(e.to_string()))?;
-    step_text::check(&bytes).map_err(OcctError)?;
-    let _guard = lock();
-    Ok(types::contents(bridge::step_contents(text)?))
-}
-
-fn path_text(path: &Path) -> Result<&str> {
-    path.to_str()
-        .ok_or_else(|| OcctError(format!("the path {} is not valid Unicode", path.display())))
 }
 
 #[cfg(test)]
