@@ -1,5 +1,6 @@
 //! `grassfire demo`: the whole chain on a project file that is part of the program.
 
+mod table;
 mod variants;
 
 use std::fmt::Write;
