@@ -38,10 +38,16 @@ struct Property {
 }
 
 #[derive(Debug)]
+struct Element {
+    name: String,
+    rows: usize,
+    properties: Vec<Property>,
+}
+
+#[derive(Debug)]
 struct Header {
     encoding: Encoding,
-    /// Name, number of rows and properties.
-    elements: Vec<(String, usize, Vec<Property>)>,
+    elements: Vec<Element>,
     /// Where the rows begin, in bytes and in lines.
     body: usize,
     lines: usize,
@@ -92,51 +98,37 @@ pub(super) fn read_tables(
 ) -> Result<Vec<Table>, IoError> {
     let header = read_header(src)?;
     let mut rest = Body {
+        src,
         bytes: &src.bytes[header.body..],
+        first: header.body,
         at: 0,
         line: header.lines,
     };
     let mut tables = Vec::new();
-    for (name, rows, properties) in &header.elements {
-        check_rows(
-            src,
-            &header,
-            rest.bytes.len() - rest.at,
-            name,
-            *rows,
-            properties,
-        )?;
-        let wanted: Vec<bool> = properties.iter().map(|p| keep(name, &p.name)).collect();
-        let mut columns: Vec<Column> = properties.iter().map(|_| Column::default()).collect();
-        for row in 0..*rows {
+    for element in &header.elements {
+        check_rows(src, &header, rest.bytes.len() - rest.at, element)?;
+        let slot = |property| Slot {
+            property,
+            wanted: keep(&element.name, &property.name),
+            column: Column::default(),
+        };
+        let mut slots: Vec<Slot> = element.properties.iter().map(slot).collect();
+        for row in 0..element.rows {
             if row % 100_000 == 0 {
                 src.monitor.check()?;
             }
             match header.encoding {
-                Encoding::Text => {
-                    rest.text_row(src, name, row, *rows, properties, &wanted, &mut columns)?
-                }
-                order => rest.binary_row(
-                    src,
-                    &header,
-                    order == Encoding::Big,
-                    (name, row, *rows),
-                    properties,
-                    &wanted,
-                    &mut columns,
-                )?,
+                Encoding::Text => rest.text_row(element, row, &mut slots)?,
+                order => rest.binary_row(element, row, &mut slots, order == Encoding::Big)?,
             }
         }
-        let named = properties.iter().map(|p| p.name.clone()).zip(columns);
-        let columns = named
-            .zip(&wanted)
-            .filter(|(_, wanted)| **wanted)
-            .map(|(column, _)| column)
-            .collect();
+        let wanted = slots.into_iter().filter(|slot| slot.wanted);
         tables.push(Table {
-            name: name.clone(),
-            rows: *rows,
-            columns,
+            name: element.name.clone(),
+            rows: element.rows,
+            columns: wanted
+                .map(|slot| (slot.property.name.clone(), slot.column))
+                .collect(),
         });
     }
     Ok(tables)
@@ -172,18 +164,17 @@ fn read_header(src: &Source) -> Result<Header, IoError> {
             }
             b"element" => {
                 let name = words.next().unwrap_or_default();
-                let rows = src.next_index(n, &mut words, "the number of rows")?;
-                header.elements.push((
-                    String::from_utf8_lossy(name).into_owned(),
-                    rows,
-                    Vec::new(),
-                ));
+                header.elements.push(Element {
+                    name: String::from_utf8_lossy(name).into_owned(),
+                    rows: src.next_index(n, &mut words, "the number of rows")?,
+                    properties: Vec::new(),
+                });
             }
             b"property" => {
-                let Some((_, _, list)) = header.elements.last_mut() else {
+                let Some(element) = header.elements.last_mut() else {
                     return Err(src.line(n, "a property before the first element"));
                 };
-                list.push(read_property(src, n, words)?);
+                element.properties.push(read_property(src, n, words)?);
                 properties += 1;
             }
             b"ply" | b"comment" | b"obj_info" | b"" => {}
@@ -233,10 +224,13 @@ fn check_rows(
     src: &Source,
     header: &Header,
     left: usize,
-    name: &str,
-    rows: usize,
-    properties: &[Property],
+    element: &Element,
 ) -> Result<(), IoError> {
+    let Element {
+        name,
+        rows,
+        properties,
+    } = element;
     let least = match header.encoding {
         Encoding::Text => 2 * properties.len(),
         _ => properties
@@ -245,7 +239,7 @@ fn check_rows(
             .sum(),
     };
     // The last line of a text may lack its end.
-    if rows > 0 && (least == 0 || rows.saturating_mul(least) > left + 1) {
+    if *rows > 0 && (least == 0 || rows.saturating_mul(least) > left + 1) {
         let name = quote(name.as_bytes());
         return Err(src.format(format!(
             "{rows} rows of element {name} do not fit into the {left} bytes left"
@@ -254,9 +248,19 @@ fn check_rows(
     Ok(())
 }
 
+/// A property of an element whose rows are being read.
+struct Slot<'a> {
+    property: &'a Property,
+    wanted: bool,
+    column: Column,
+}
+
 /// The rows, read from front to back.
 struct Body<'a> {
+    src: &'a Source<'a>,
     bytes: &'a [u8],
+    /// Where they begin in the file.
+    first: usize,
     at: usize,
     line: usize,
 }
@@ -276,86 +280,77 @@ impl<'a> Body<'a> {
         None
     }
 
-    #[allow(clippy::too_many_arguments)]
     fn text_row(
         &mut self,
-        src: &Source,
-        name: &str,
+        element: &Element,
         row: usize,
-        rows: usize,
-        properties: &[Property],
-        wanted: &[bool],
-        columns: &mut [Column],
+        slots: &mut [Slot],
     ) -> Result<(), IoError> {
+        let src = self.src;
+        let name = || quote(element.name.as_bytes());
         let Some(line) = self.next_line() else {
             return Err(src.line(
                 self.line,
                 format!(
-                    "the file ends at row {row} of {rows} of element {}",
-                    quote(name.as_bytes())
+                    "the file ends at row {row} of {} of element {}",
+                    element.rows,
+                    name()
                 ),
             ));
         };
         let mut words = tokens(line);
-        for ((property, &wanted), column) in properties.iter().zip(wanted).zip(columns) {
+        for slot in slots {
+            let (property, column) = (slot.property, &mut slot.column);
             let count = match property.list {
                 Some(_) => src.next_index(self.line, &mut words, "the length of a list")?,
                 None => 1,
             };
             for _ in 0..count {
                 let Some(word) = words.next() else {
-                    let what = format!(
-                        "too few values for row {row} of element {}",
-                        quote(name.as_bytes())
-                    );
+                    let what = format!("too few values for row {row} of element {}", name());
                     return Err(src.line(self.line, what));
                 };
-                if wanted {
+                if slot.wanted {
                     column.values.push(src.number(self.line, word)?);
                 }
             }
-            if wanted && property.list.is_some() {
+            if slot.wanted && property.list.is_some() {
                 column.ends.push(column.values.len());
             }
         }
         if words.next().is_some() {
             return Err(src.line(
                 self.line,
-                format!(
-                    "too many values for row {row} of element {}",
-                    quote(name.as_bytes())
-                ),
+                format!("too many values for row {row} of element {}", name()),
             ));
         }
         Ok(())
     }
 
-    #[allow(clippy::too_many_arguments)]
     fn binary_row(
         &mut self,
-        src: &Source,
-        header: &Header,
+        element: &Element,
+        row: usize,
+        slots: &mut [Slot],
         big: bool,
-        (name, row, rows): (&str, usize, usize),
-        properties: &[Property],
-        wanted: &[bool],
-        columns: &mut [Column],
     ) -> Result<(), IoError> {
-        let bytes = self.bytes;
+        let (src, first, end) = (self.src, self.first, self.first + self.bytes.len());
         let cut = || {
             let what = format!(
-                "the file ends inside row {row} of {rows} of element {}",
-                quote(name.as_bytes())
+                "the file ends inside row {row} of {} of element {}",
+                element.rows,
+                quote(element.name.as_bytes())
             );
-            src.byte(header.body + bytes.len(), what)
+            src.byte(end, what)
         };
-        for ((property, &wanted), column) in properties.iter().zip(wanted).zip(columns) {
+        for slot in slots {
+            let (property, column) = (slot.property, &mut slot.column);
             let count = match property.list {
                 Some(kind) => {
                     let count = kind.decode(self.take(kind.size()).ok_or_else(cut)?, big);
                     if !(count >= 0.0 && count.fract() == 0.0) {
                         return Err(src.byte(
-                            header.body + self.at,
+                            first + self.at,
                             format!("{count} is not a length of a list"),
                         ));
                     }
@@ -368,7 +363,7 @@ impl<'a> Body<'a> {
                 .checked_mul(size)
                 .and_then(|n| self.take(n))
                 .ok_or_else(cut)?;
-            if wanted {
+            if slot.wanted {
                 column.values.extend(property.kind.decode_all(data, big));
                 if property.list.is_some() {
                     column.ends.push(column.values.len());
