@@ -52,15 +52,11 @@ pub(super) fn prune_curves(
     points
 }
 
-fn burn_curves(
-    complex: &Complex,
-    alive: &Alive,
-    limit: impl Fn(f32) -> f32,
-) -> (Vec<Burnt>, Vec<bool>) {
+/// Which edges are curves, where they meet, and how many edges that are left every vertex has.
+fn curves(complex: &Complex, alive: &Alive) -> (Vec<bool>, Incidence, Vec<u32>) {
     let is_curve: Vec<bool> = (0..complex.edges.len() as u32)
         .map(|e| alive.edges[e as usize] && alive.faces_at(complex, e).next().is_none())
         .collect();
-    let mut left = is_curve.clone();
     let at = Incidence::of(complex, &is_curve);
     let mut degree = vec![0u32; complex.radii.len()];
     for (ends, _) in complex
@@ -71,6 +67,15 @@ fn burn_curves(
     {
         ends.iter().for_each(|&v| degree[v as usize] += 1);
     }
+    (is_curve, at, degree)
+}
+
+fn burn_curves(
+    complex: &Complex,
+    alive: &Alive,
+    limit: impl Fn(f32) -> f32,
+) -> (Vec<Burnt>, Vec<bool>) {
+    let (mut left, at, mut degree) = curves(complex, alive);
     let mut front: BinaryHeap<_> = (0..degree.len())
         .filter(|&v| degree[v] == 1)
         .map(|v| key(complex.radii[v], v as u32))
@@ -130,19 +135,7 @@ fn burn_curves(
 /// Cuts back dangling curves to the innermost place whose ball, widened by `tolerance(its radius)`, holds
 /// all balls from there to the tip: what lies beyond is a spur to the surface.
 pub(super) fn trim_tips(complex: &Complex, alive: &mut Alive, tolerance: impl Fn(f32) -> f32) {
-    let is_curve: Vec<bool> = (0..complex.edges.len() as u32)
-        .map(|e| alive.edges[e as usize] && alive.faces_at(complex, e).next().is_none())
-        .collect();
-    let at = Incidence::of(complex, &is_curve);
-    let mut degree = vec![0u32; complex.radii.len()];
-    for (ends, _) in complex
-        .edges
-        .iter()
-        .zip(&alive.edges)
-        .filter(|(_, alive)| **alive)
-    {
-        ends.iter().for_each(|&v| degree[v as usize] += 1);
-    }
+    let (_, at, mut degree) = curves(complex, alive);
     for tip in (0..degree.len() as u32)
         .filter(|&v| degree[v as usize] == 1)
         .collect::<Vec<_>>()
