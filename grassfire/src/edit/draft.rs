@@ -93,7 +93,7 @@ impl EditedSkeleton {
     }
 
     /// Removes quads and beams, not their material, and points that nothing uses then.
-    pub(super) fn drop_cells(&mut self, quads: &[bool], beams: &[bool]) {
+    fn drop_cells(&mut self, quads: &[bool], beams: &[bool]) {
         keep_unless(&mut self.skeleton.quads, quads);
         keep_unless(&mut self.fresh_quads, quads);
         keep_unless(&mut self.skeleton.beams, beams);

@@ -66,8 +66,7 @@ pub fn sample_surface(mesh: &TriMesh, count: usize) -> Vec<(Vec3, u32)> {
     let mut sums = Vec::with_capacity(mesh.triangles.len());
     let mut total = 0.0;
     for t in 0..mesh.triangles.len() {
-        let [a, b, c] = mesh.corners(t);
-        let area = (b - a).cross(&(c - a)).norm() / 2.0;
+        let area = mesh.triangle_area(t);
         total += if area.is_finite() { area } else { 0.0 };
         sums.push(total);
     }
@@ -121,7 +120,7 @@ pub fn two_sided(
 }
 
 /// Distances from sample points of `from` to the surface in `to`, in sample order, with their places.
-pub fn one_sided(
+fn one_sided(
     from: &TriMesh,
     to: &Bvh,
     samples: usize,
@@ -141,7 +140,7 @@ pub fn one_sided(
 }
 
 /// Root mean square, 95th percentile and maximum of sampled distances.
-pub fn summary(samples: &[(Vec3, f64)]) -> DistanceSummary {
+fn summary(samples: &[(Vec3, f64)]) -> DistanceSummary {
     if samples.is_empty() {
         return DistanceSummary::default();
     }

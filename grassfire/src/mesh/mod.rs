@@ -43,6 +43,12 @@ impl TriMesh {
         (b - a).cross(&(c - a)).try_normalize(0.0)
     }
 
+    /// Area of triangle `t`, mm2.
+    pub fn triangle_area(&self, t: usize) -> f64 {
+        let [a, b, c] = self.corners(t);
+        (b - a).cross(&(c - a)).norm() / 2.0
+    }
+
     /// Adds points, and triangles that count from the first of these. Tags are left to the caller.
     pub fn append(
         &mut self,
@@ -71,10 +77,7 @@ impl TriMesh {
     /// Surface area, mm2.
     pub fn area(&self) -> f64 {
         (0..self.triangles.len())
-            .map(|t| {
-                let [a, b, c] = self.corners(t);
-                (b - a).cross(&(c - a)).norm() / 2.0
-            })
+            .map(|t| self.triangle_area(t))
             .sum()
     }
 

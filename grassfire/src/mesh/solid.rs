@@ -56,11 +56,6 @@ impl Solid {
         &self.0
     }
 
-    /// Gives the mesh back.
-    pub fn into_mesh(self) -> TriMesh {
-        self.0
-    }
-
     /// V - E + F over all shells.
     pub fn euler(&self) -> i64 {
         let mut used = vec![false; self.0.points.len()];

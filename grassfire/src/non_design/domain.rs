@@ -70,8 +70,7 @@ pub fn coverage(
         let Some(face) = faces.tags.get(t).and_then(|f| out.get_mut(*f as usize)) else {
             continue;
         };
-        let [a, b, c] = faces.corners(t);
-        let area = (b - a).cross(&(c - a)).norm() / 2.0;
+        let ([a, b, c], area) = (faces.corners(t), faces.triangle_area(t));
         face.area += area;
         face.coverage += area * share;
         face.middle += (a + b + c) * (area / 3.0);

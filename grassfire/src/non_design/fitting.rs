@@ -48,7 +48,7 @@ pub(super) fn fit(facets: &Facets, like: &Primitive, triangles: &[u32]) -> Optio
     fit_points(facets, like, triangles, &facets.points(triangles))
 }
 
-pub(super) fn fit_points(
+fn fit_points(
     facets: &Facets,
     like: &Primitive,
     triangles: &[u32],
@@ -121,7 +121,7 @@ pub(super) fn merge(
     groups
 }
 
-pub(super) fn same_surface(
+fn same_surface(
     facets: &Facets,
     a: &Primitive,
     a_triangles: &[u32],

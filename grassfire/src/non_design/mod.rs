@@ -4,7 +4,7 @@
 //! 2. [`flats`] picks the flat faces with sharp borders, which the part gets exactly plane on request.
 //! 3. [`coverage`] tells which faces of a design space given as CAD the proposal still follows.
 //!
-//! Both only measure. The CAD stage makes solids of what was found; the pipeline decides which of them are united.
+//! All of them only measure. The CAD stage makes solids of what was found; the pipeline decides which of them are united.
 
 mod bosses;
 mod domain;

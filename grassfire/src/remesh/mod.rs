@@ -140,10 +140,7 @@ pub fn remesh_density(
     monitor: &Monitor,
 ) -> Result<Remeshed, RemeshError> {
     check(options)?;
-    let mut padded = density::padded(density, iso, options, monitor)?;
-    let mut set = VoxelSet::positive(padded.dims, &padded.values);
-    compose::separate_opposite_empties(&mut padded, &mut set);
-    let mesh = usable(&extract::surface(&padded, &set, false).mesh)?;
+    let mesh = iso_surface(density, iso, options, monitor)?;
     remesh_on(&mesh, Some(density.spacing), options, monitor)
 }
 

@@ -67,10 +67,7 @@ pub(super) fn voxel_for(mesh: &TriMesh, bvh: &Bvh, options: &RemeshOptions) -> f
 fn wall_thickness(mesh: &TriMesh, bvh: &Bvh) -> Option<[f64; 2]> {
     let (lo, hi) = bvh.bounds()?;
     let diagonal = (hi - lo).norm();
-    let normal = |t: u32| {
-        let [a, b, c] = mesh.corners(t as usize);
-        (b - a).cross(&(c - a)).try_normalize(0.0)
-    };
+    let normal = |t: u32| mesh.normal(t as usize);
     let mut walls: Vec<f64> = sample_surface(mesh, RAYS)
         .into_par_iter()
         .filter_map(|(p, t)| {

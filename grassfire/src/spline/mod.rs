@@ -3,6 +3,7 @@
 mod bezier;
 mod blocks;
 mod brep;
+pub mod catmull_clark;
 mod coarsen;
 mod corner;
 mod curvature;
@@ -19,7 +20,6 @@ mod removal;
 mod sink;
 mod slide;
 mod stencils;
-
 mod tessellate;
 
 pub use bezier::{SurfacePoint, evaluate};
@@ -34,7 +34,6 @@ pub use removal::{CoarserStep, take_quads_out};
 pub use sink::sink_flush;
 pub use slide::{Crowded, slide_borders};
 pub use tessellate::{SurfaceSample, TessellateOptions, Tessellation, tessellate};
-pub mod catmull_clark;
 
 use crate::Vec3;
 

@@ -192,7 +192,7 @@ impl Complex {
     }
 
     /// Quad `q` runs from the lower to the higher end of edge `e`.
-    pub fn runs_along(&self, e: u32, q: u32) -> bool {
+    fn runs_along(&self, e: u32, q: u32) -> bool {
         let edge = &self.edges[e as usize];
         edge.uses
             .iter()

@@ -9,13 +9,13 @@ mod node;
 mod regions;
 mod sectors;
 
+pub use adopt::adopt;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
 use crate::monitor::{Cancelled, Monitor};
-pub use adopt::adopt;
-
 use crate::skeleton::Skeleton;
 use crate::spline::ControlMesh;
 

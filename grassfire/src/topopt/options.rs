@@ -197,7 +197,7 @@ impl OptimizeOptions {
     }
 
     /// Sharpness of the projection of iteration `i`, from 0.
-    pub fn beta_at(&self, i: usize) -> f64 {
+    fn beta_at(&self, i: usize) -> f64 {
         let doublings = match i.checked_sub(self.beta_start) {
             None => 0,
             Some(late) => late / self.beta_every.max(1) + 1,

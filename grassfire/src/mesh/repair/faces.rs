@@ -140,7 +140,7 @@ pub(super) fn drop_fins(mesh: &mut TriMesh, options: &RepairOptions, repairs: &m
         let patches = edges.connected(mesh.triangles.len(), |halves| halves.len() == 2);
         let mut areas = vec![0.0; patches.count];
         for (t, &patch) in patches.of_face.iter().enumerate() {
-            areas[patch as usize] += triangle_area(mesh, t);
+            areas[patch as usize] += mesh.triangle_area(t);
         }
         let total: f64 = areas.iter().sum();
         let (mut open, mut shared) = (vec![false; patches.count], vec![false; patches.count]);
@@ -171,9 +171,4 @@ pub(super) fn drop_fins(mesh: &mut TriMesh, options: &RepairOptions, repairs: &m
         let text = format!("{count} faces of fins dropped, {area:.4} mm2");
         repairs.push(Repair::new(RepairKind::Fins, count, text));
     }
-}
-
-pub(super) fn triangle_area(mesh: &TriMesh, t: usize) -> f64 {
-    let [a, b, c] = mesh.corners(t);
-    (b - a).cross(&(c - a)).norm() / 2.0
 }

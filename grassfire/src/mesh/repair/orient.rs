@@ -2,7 +2,6 @@
 
 use super::super::TriMesh;
 use super::edges::Edges;
-use super::faces::triangle_area;
 use super::{Repair, RepairKind};
 
 /// Turns faces so that neighbours across edges with two faces agree; each patch keeps the sense that most of its area has. Whether
@@ -21,7 +20,7 @@ pub(super) fn orient(mesh: &mut TriMesh, repairs: &mut Vec<Repair>) {
         spread(mesh, &edges, seed, &mut seen, &mut turned, &mut patch);
         let area = |flag: bool| -> f64 {
             let chosen = patch.iter().filter(|&&t| turned[t as usize] == flag);
-            chosen.map(|&t| triangle_area(mesh, t as usize)).sum()
+            chosen.map(|&t| mesh.triangle_area(t as usize)).sum()
         };
         let invert = area(true) > area(false);
         for &t in &patch {
