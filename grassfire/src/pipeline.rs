@@ -17,6 +17,7 @@ mod even;
 mod exchange;
 mod feeding;
 mod fewest;
+mod finished;
 mod follow;
 mod illustrate;
 mod inputs;
@@ -75,8 +76,9 @@ use crate::spline::{BrepOptions, PatchOptions, TessellateOptions};
 use crate::thicken::ThickenOptions;
 
 use bodies::Bodies;
-use construct::{Made, Site};
+use construct::Site;
 use deliver::Delivery;
+use finished::Finished;
 use record::Record;
 
 /// Options of all stages; each field is one table of the project file and one prefix of `--set`.
@@ -393,66 +395,26 @@ fn rebuild(
         Some(grown) => site.build_grown(grown)?,
         None => site.build()?,
     };
-    let Made {
-        axis,
-        shape,
-        part,
-        distance,
-    } = made;
     let grown_before = !std::ptr::eq(site.remeshed, base);
     let grown = site.grown.take();
     let before = fed.as_ref().filter(|_| grown_before).map(|f| &f.solid);
     let remeshed = grown.as_ref().or(before).unwrap_or(&original);
-    if !std::ptr::eq(remeshed, &original) || !options.edits.is_empty() {
-        record.stage("write", || {
-            delivery.stl("edited.stl", remeshed.solid.mesh())
-        })?;
-    }
-    part.report(&mut record.report, shape.faces_deviation);
-    let added = remeshed.solid.volume() - original.solid.volume();
-    let feeders = feeding::poured(record, part.volume, added);
-    record.report.refused = record.stage("write", || {
-        let files = exchange::Files {
-            job,
-            part: &part,
-            #[cfg(feature = "occt")]
-            bodies: &bodies,
-            #[cfg(feature = "occt")]
-            voxel: remeshed.field.spacing,
-            feeders: &feeders,
-            delivery: &delivery,
-        };
-        files.write(monitor)
-    })?;
-
-    measure::name_far_places(&distance, remeshed.field.spacing, monitor);
-    record.report.distance = Some(measure::distance_block(&distance, remeshed, &part));
-    record.report.volume = Some(measure::volume_block(remeshed, &part));
-
-    feeding::prove(record, &original, &part.mesh, options, monitor)?;
-    let on = (&bodies, remeshed.field.spacing);
-    casting::mould_of(record, &part.mesh, on, &options.mould, monitor)?;
-    let places = casting::sheet_places(record);
-    let pictures = record.stage("pictures", || {
-        let stages = illustrate::Stages {
-            remeshed,
-            poles: &poles,
-            axis: &axis,
-            shape: &shape,
-            part: &part,
-            non_design: &bodies,
-        };
-        let mut pictures = illustrate::pictures(&stages, &options.report, monitor)?;
-        pictures.extend(casting::sheet_pictures(
-            &places,
-            &part.mesh,
-            &options.report,
-        )?);
-        Ok::<_, StageError>(pictures)
-    })?;
+    let finished = Finished {
+        job,
+        options,
+        original: &original,
+        remeshed,
+        bodies: &bodies,
+        poles: &poles,
+        made: &made,
+        delivery: &delivery,
+    };
+    finished.write(record, monitor)?;
+    finished.measure(record, monitor)?;
+    let pictures = finished.draw(record, monitor)?;
     Ok(Rebuilt {
         delivery,
         pictures,
-        mesh: part.mesh,
+        mesh: made.part.mesh,
     })
 }
