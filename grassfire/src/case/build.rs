@@ -56,27 +56,9 @@ pub struct Built {
 /// [`CaseError`] names the key, the place and the value.
 pub fn build(case: &Case, folder: &Path, monitor: &Monitor) -> Result<Built, CaseError> {
     case.check()?;
-    let load = |key: &str, shapes: &[Shape]| Solid::load_all(shapes, key, folder, monitor);
-    let space = load("design.space", &case.design.space)?;
-    let mut bodies = Vec::new();
-    for (i, body) in case.non_design.iter().enumerate() {
-        let shapes = load(&format!("non_design[{i}].shapes"), &body.shapes)?;
-        bodies.push((shapes, load(&format!("non_design[{i}].cut"), &body.cut)?));
-    }
-    let solids = space
-        .iter()
-        .chain(bodies.iter().flat_map(|(shapes, _)| shapes));
-    let mut bounds: Option<(Vec3, Vec3)> = None;
-    for (lo, hi) in solids.filter_map(Solid::bounds) {
-        bounds = Some(bounds.map_or((lo, hi), |(a, b)| (a.inf(&lo), b.sup(&hi))));
-    }
-    let Some((low, high)) = bounds else {
-        return Err(super::value(
-            "design.space",
-            "endless",
-            "a shape with an end",
-        ));
-    };
+    let space = Solid::load_all(&case.design.space, "design.space", folder, monitor)?;
+    let bodies = load_bodies(case, folder, monitor)?;
+    let (low, high) = bounds(&space, &bodies)?;
     let (origin, dims) = grid::place(case, case.grid.h, low, high, f64::INFINITY)?;
     let mut problem = Problem {
         origin,
@@ -87,56 +69,7 @@ pub fn build(case: &Case, folder: &Path, monitor: &Monitor) -> Result<Built, Cas
         nu: case.material.nu,
         ..Problem::default()
     };
-    let centres: Vec<Vec3> = (0..problem.labels.len())
-        .map(|v| problem.centre(v))
-        .collect();
-    monitor.step(STAGE, "voxels of the design space", 0.1)?;
-    let cut = load("design.cut", &case.design.cut)?;
-    let within = any(&space, &centres);
-    let without = any(&cut, &centres);
-    for v in 0..centres.len() {
-        problem.labels[v] = if within[v] && !without[v] {
-            DESIGN
-        } else {
-            OUTSIDE
-        };
-    }
-    for (i, keep) in case.keep_out.iter().enumerate() {
-        let shapes = load(&format!("keep_out[{i}].shapes"), &keep.shapes)?;
-        let label = if keep.core { CORE } else { OUTSIDE };
-        for (v, _) in any(&shapes, &centres)
-            .iter()
-            .enumerate()
-            .filter(|(_, f)| **f)
-        {
-            problem.labels[v] = label;
-        }
-    }
-    let mut owned = Vec::new();
-    for (body, (shapes, cut)) in case.non_design.iter().zip(&bodies) {
-        monitor.step(STAGE, &body.name, 0.5)?;
-        let (inside, away) = (any(shapes, &centres), any(cut, &centres));
-        let voxels: Vec<usize> = (0..centres.len())
-            .filter(|&v| inside[v] && !away[v])
-            .collect();
-        if voxels.is_empty() {
-            return Err(CaseError::BodyTooSmall {
-                name: body.name.clone(),
-                h: problem.h,
-            });
-        }
-        if !touches_space(&problem, &within, &voxels) {
-            return Err(CaseError::BodyOutside {
-                name: body.name.clone(),
-                voxels: voxels.len(),
-            });
-        }
-        owned.push(voxels);
-    }
-    for &v in owned.iter().flatten() {
-        problem.labels[v] = FROZEN;
-    }
-    drop(centres);
+    let owned = label(&mut problem, case, folder, (&space, &bodies), monitor)?;
     let mut built = Built {
         bodies: case
             .non_design
@@ -154,6 +87,94 @@ pub fn build(case: &Case, folder: &Path, monitor: &Monitor) -> Result<Built, Cas
     hold(&mut problem, monitor)?;
     built.problem = problem;
     Ok(built)
+}
+
+/// A non-design body ready for questions.
+struct BodySolid {
+    shapes: Vec<Solid>,
+    cut: Vec<Solid>,
+}
+
+impl BodySolid {
+    /// Which points lie inside, in order.
+    fn contains(&self, points: &[Vec3]) -> Vec<bool> {
+        let mut inside = any(&self.shapes, points);
+        let away = any(&self.cut, points);
+        inside.iter_mut().zip(away).for_each(|(i, a)| *i &= !a);
+        inside
+    }
+}
+
+fn load_bodies(case: &Case, folder: &Path, monitor: &Monitor) -> Result<Vec<BodySolid>, CaseError> {
+    let load = |key: &str, shapes: &[Shape]| Solid::load_all(shapes, key, folder, monitor);
+    let bodies = case.non_design.iter().enumerate().map(|(i, body)| {
+        Ok(BodySolid {
+            shapes: load(&format!("non_design[{i}].shapes"), &body.shapes)?,
+            cut: load(&format!("non_design[{i}].cut"), &body.cut)?,
+        })
+    });
+    bodies.collect()
+}
+
+/// Lower and upper corner of the space and the bodies.
+fn bounds(space: &[Solid], bodies: &[BodySolid]) -> Result<(Vec3, Vec3), CaseError> {
+    let solids = space.iter().chain(bodies.iter().flat_map(|b| &b.shapes));
+    let bounds = solids.filter_map(Solid::bounds);
+    bounds
+        .reduce(|(a, b), (lo, hi)| (a.inf(&lo), b.sup(&hi)))
+        .ok_or_else(|| super::value("design.space", "endless", "a shape with an end"))
+}
+
+/// Labels the voxels of a problem by what their centres lie in; gives those of every body.
+fn label(
+    problem: &mut Problem,
+    case: &Case,
+    folder: &Path,
+    (space, bodies): (&[Solid], &[BodySolid]),
+    monitor: &Monitor,
+) -> Result<Vec<Vec<usize>>, CaseError> {
+    let load = |key: &str, shapes: &[Shape]| Solid::load_all(shapes, key, folder, monitor);
+    let centres: Vec<Vec3> = (0..problem.labels.len())
+        .map(|v| problem.centre(v))
+        .collect();
+    monitor.step(STAGE, "voxels of the design space", 0.1)?;
+    let cut = load("design.cut", &case.design.cut)?;
+    let within = any(space, &centres);
+    let without = any(&cut, &centres);
+    for v in (0..centres.len()).filter(|&v| within[v] && !without[v]) {
+        problem.labels[v] = DESIGN;
+    }
+    for (i, keep) in case.keep_out.iter().enumerate() {
+        let shapes = load(&format!("keep_out[{i}].shapes"), &keep.shapes)?;
+        let label = if keep.core { CORE } else { OUTSIDE };
+        let kept = any(&shapes, &centres);
+        for v in (0..centres.len()).filter(|&v| kept[v]) {
+            problem.labels[v] = label;
+        }
+    }
+    let mut owned = Vec::new();
+    for (body, solid) in case.non_design.iter().zip(bodies) {
+        monitor.step(STAGE, &body.name, 0.5)?;
+        let inside = solid.contains(&centres);
+        let voxels: Vec<usize> = (0..centres.len()).filter(|&v| inside[v]).collect();
+        if voxels.is_empty() {
+            return Err(CaseError::BodyTooSmall {
+                name: body.name.clone(),
+                h: problem.h,
+            });
+        }
+        if !touches_space(problem, &within, &voxels) {
+            return Err(CaseError::BodyOutside {
+                name: body.name.clone(),
+                voxels: voxels.len(),
+            });
+        }
+        owned.push(voxels);
+    }
+    for &v in owned.iter().flatten() {
+        problem.labels[v] = FROZEN;
+    }
+    Ok(owned)
 }
 
 /// Supports and load cases on the nodes of a problem that is finer than its project file says: its voxels were cut. The
@@ -187,17 +208,8 @@ pub(crate) fn in_bodies(
     points: &[Vec3],
     monitor: &Monitor,
 ) -> Result<Vec<Vec<bool>>, CaseError> {
-    let within = |key: &str, shapes: &[Shape]| -> Result<Vec<bool>, CaseError> {
-        Ok(any(&Solid::load_all(shapes, key, folder, monitor)?, points))
-    };
-    let mut out = Vec::new();
-    for (i, body) in case.non_design.iter().enumerate() {
-        let mut inside = within(&format!("non_design[{i}].shapes"), &body.shapes)?;
-        let away = within(&format!("non_design[{i}].cut"), &body.cut)?;
-        inside.iter_mut().zip(away).for_each(|(i, a)| *i &= !a);
-        out.push(inside);
-    }
-    Ok(out)
+    let bodies = load_bodies(case, folder, monitor)?;
+    Ok(bodies.iter().map(|body| body.contains(points)).collect())
 }
 
 /// Whether voxels lie in the space or share a face with it.
