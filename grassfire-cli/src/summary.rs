@@ -5,9 +5,47 @@ use std::path::Path;
 
 use grassfire::report::Report;
 
+/// A word and what is said of it.
+type Line = (&'static str, String);
+
 /// Sizes, verdicts and where the files lie.
 pub fn text(report: &Report, output: &Path) -> String {
-    let mut lines: Vec<(&str, String)> = Vec::new();
+    let mut lines = proposal(report);
+    lines.extend(part(report));
+    lines.extend(stiffness(report));
+    lines.extend(casting(report));
+    lines.extend(verdicts(report));
+    if !report.stages.is_empty() {
+        let seconds: f64 = report.stages.iter().map(|stage| stage.seconds).sum();
+        let memory = report
+            .stages
+            .iter()
+            .map(|stage| stage.peak_memory)
+            .fold(0.0, f64::max);
+        lines.push(("time", format!("{seconds:.1} s, {memory:.0} MB")));
+    }
+    for name in [
+        "density.vti",
+        "result.vtu",
+        "part.step",
+        "solidification.vti",
+        "repaired.stl",
+        "report.html",
+    ] {
+        if report.files.iter().any(|file| file.path == name) {
+            lines.push(("written", output.join(name).display().to_string()));
+        }
+    }
+    lines.iter().fold(String::new(), |mut text, (name, value)| {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{name:>9}  {value}");
+        text
+    })
+}
+
+/// The optimization and the proposal.
+fn proposal(report: &Report) -> Vec<Line> {
+    let mut lines = Vec::new();
     if let Some(block) = &report.optimize {
         let end = if block.converged {
             ""
@@ -42,6 +80,12 @@ pub fn text(report: &Report, output: &Path) -> String {
             ),
         ));
     }
+    lines
+}
+
+/// The reconstruction.
+fn part(report: &Report) -> Vec<Line> {
+    let mut lines = Vec::new();
     if let Some(block) = &report.skeleton {
         lines.push((
             "skeleton",
@@ -79,8 +123,12 @@ pub fn text(report: &Report, output: &Path) -> String {
             ),
         ));
     }
-    lines.extend(stiffness(report));
-    lines.extend(casting(report));
+    lines
+}
+
+/// How many checks are met, and which are not.
+fn verdicts(report: &Report) -> Vec<Line> {
+    let mut lines = Vec::new();
     if !report.checks.is_empty() {
         let met = report.checks.iter().filter(|check| check.met).count();
         lines.push(("checks", format!("{met} of {} met", report.checks.len())));
@@ -102,32 +150,7 @@ pub fn text(report: &Report, output: &Path) -> String {
             ),
         ));
     }
-    if !report.stages.is_empty() {
-        let seconds: f64 = report.stages.iter().map(|stage| stage.seconds).sum();
-        let memory = report
-            .stages
-            .iter()
-            .map(|stage| stage.peak_memory)
-            .fold(0.0, f64::max);
-        lines.push(("time", format!("{seconds:.1} s, {memory:.0} MB")));
-    }
-    for name in [
-        "density.vti",
-        "result.vtu",
-        "part.step",
-        "solidification.vti",
-        "repaired.stl",
-        "report.html",
-    ] {
-        if report.files.iter().any(|file| file.path == name) {
-            lines.push(("written", output.join(name).display().to_string()));
-        }
-    }
-    lines.iter().fold(String::new(), |mut text, (name, value)| {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "{name:>9}  {value}");
-        text
-    })
+    lines
 }
 
 /// A number with so many decimals, and with more where three significant digits need them.
@@ -140,7 +163,7 @@ fn number(value: f64, decimals: usize) -> String {
 }
 
 /// Verification.
-fn stiffness(report: &Report) -> Vec<(&'static str, String)> {
+fn stiffness(report: &Report) -> Vec<Line> {
     let Some(block) = &report.verify else {
         return Vec::new();
     };
@@ -200,7 +223,7 @@ fn stiffness(report: &Report) -> Vec<(&'static str, String)> {
 }
 
 /// Feeding and solidification.
-fn casting(report: &Report) -> Vec<(&'static str, String)> {
+fn casting(report: &Report) -> Vec<Line> {
     let mut lines = Vec::new();
     if let Some(block) = &report.feed {
         let text = format!(
