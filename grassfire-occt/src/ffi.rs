@@ -10,7 +10,11 @@ impl Interrupt<'_> {
 }
 
 #[cxx::bridge(namespace = "grassfire")]
-#[allow(clippy::missing_safety_doc, missing_docs)]
+#[allow(
+    clippy::missing_safety_doc,
+    missing_docs,
+    reason = "Shape and its types say what each of these does"
+)]
 pub(crate) mod bridge {
     /// See [`crate::Counts`].
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,5 +1,5 @@
 //! Readers for tests of the CAD stage: the prototype's B-rep text format, STL, and the corpus folder.
-#![allow(dead_code)]
+#![allow(dead_code, reason = "every test crate uses some of it")]
 
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,5 @@
 //! Skeletons for tests: generated ones, and ASCII PLY files from the corpus of intermediate stages.
-#![allow(dead_code)]
+#![allow(dead_code, reason = "every test crate uses some of it")]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
