@@ -1,12 +1,13 @@
 //! The non-design bodies of a run, as solids for the union and as surfaces for measuring.
 
-use super::ReconstructJob;
 #[cfg(feature = "occt")]
 use super::case_bodies;
 use super::error::StageError;
+use super::{ReconstructJob, ReconstructOptions};
 use crate::Vec3;
 #[cfg(feature = "occt")]
 use crate::cad::{self, NonDesignBody};
+use crate::fit::{clear_of, raised};
 #[cfg(feature = "occt")]
 use crate::io::{self, Input};
 use crate::mesh::{Bvh, TriMesh};
@@ -16,6 +17,7 @@ use crate::non_design::Boss;
 use crate::non_design::Flats;
 use crate::remesh::{Bosses, Capsule, RemeshOptions};
 use crate::report::FlatBlock;
+use crate::voxel::VoxelGrid;
 #[cfg(feature = "occt")]
 use grassfire_occt::Triangulation;
 
@@ -110,6 +112,27 @@ impl Bodies {
         };
         out.keep_open.extend(&self.bosses.free);
         out
+    }
+
+    /// The field that a body of the whole proposal is fitted to: it ends inside the walls of given bodies, and bulges over flat faces
+    /// that are cut later. `voxel` is the one that the skeleton is made at, mm.
+    pub(super) fn target(
+        &self,
+        field: &VoxelGrid<f32>,
+        voxel: f64,
+        options: &ReconstructOptions,
+    ) -> VoxelGrid<f32> {
+        let depth = options.non_design.clearance * voxel;
+        let clear = if self.recognised {
+            // They are made from the proposal's own walls, too thin for a body to end inside them.
+            field.clone()
+        } else {
+            // A repair's draft widens the proposal's copies of them.
+            let films = options.mould.leans().is_some();
+            clear_of(field, &self.bosses, depth, films)
+        };
+        let rise = options.flats.raise * voxel;
+        raised(&clear, &self.flats, rise).unwrap_or(clear)
     }
 
     /// Leaves recognised bodies out of a wrapped part, which follows the proposal closely anyway and whose many faces take

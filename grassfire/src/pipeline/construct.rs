@@ -10,7 +10,7 @@ use super::record::Record;
 use super::shape::{self, Base, Shape};
 use super::union::{Part, Union};
 use super::{ReconstructOptions, measure};
-use crate::fit::{self, FitOptions, clear_of, raised};
+use crate::fit::{self, FitOptions};
 use crate::medial::MedialAxis;
 use crate::mesh::Distance;
 use crate::monitor::Monitor;
@@ -290,20 +290,8 @@ impl<'a> Site<'a> {
         self.record
             .stage("write", || delivery.remove("design_part.stl"))?;
         let bodies = &*self.bodies;
-        let target = |field: &VoxelGrid<f32>| {
-            let depth = options.non_design.clearance * voxel;
-            let clear = if bodies.recognised {
-                // They are made from the proposal's own walls, too thin for a body to end inside them.
-                field.clone()
-            } else {
-                // A repair's draft widens the proposal's copies of them.
-                let films = options.mould.leans().is_some();
-                clear_of(field, &bodies.bosses, depth, films)
-            };
-            let rise = options.flats.raise * voxel;
-            raised(&clear, &bodies.flats, rise).unwrap_or(clear)
-        };
         let (coarse, fine) = self.record.stage("fit", || {
+            let target = |field: &VoxelGrid<f32>| bodies.target(field, voxel, options);
             let fine = self.fine.map(|fine| target(&fine.field));
             Ok::<_, StageError>((target(&remeshed.field), fine))
         })?;

@@ -87,7 +87,7 @@ pub(super) struct Grown {
 
 /// The proposal with sections that grow towards the feeders; none when nothing is to be fed or nothing has to grow.
 ///
-/// 1. The least radii on the proposal's skeleton or medial axis ([`feed_graph`]).
+/// 1. The least radii on the proposal's skeleton or medial axis ([`feed()`], [`even::balls_fed`]).
 /// 2. The proposal's field moves outward by what they grew ([`grow`]); bores that stay free stay so.
 /// 3. The grown field is remeshed: where gaps close, the topology changes here and is known to all later stages. Gaps below
 ///    `mould.min_gap` close, too.
