@@ -8,8 +8,7 @@ use crate::mesh::{Distance, DistanceOptions, two_sided};
 use crate::monitor::{Cancelled, Monitor};
 use crate::remesh::Remeshed;
 use crate::report::{
-    BodyBlock, CornerDeviation, DistanceBlock, RadiusRange, RemeshBlock, SkeletonBlock,
-    TopologyBlock, VolumeBlock,
+    BodyBlock, DistanceBlock, RemeshBlock, SkeletonBlock, TopologyBlock, VolumeBlock,
 };
 use crate::topology::{Betti, SurfaceTopology};
 
@@ -53,7 +52,6 @@ pub(super) fn topology_block(
 
 pub(super) fn skeleton_block(axis: &MedialAxis, shape: &Shape, layout: &str) -> SkeletonBlock {
     let stats = &shape.skeleton.stats;
-    let corners = &stats.corner_deviation;
     SkeletonBlock {
         layout: layout.to_owned(),
         quads: stats.quads,
@@ -63,16 +61,8 @@ pub(super) fn skeleton_block(axis: &MedialAxis, shape: &Shape, layout: &str) -> 
         rims: stats.rims,
         spheres: axis.mesh.points.len(),
         regular_fraction: stats.regular_fraction,
-        corner_deviation: CornerDeviation {
-            mean: corners.mean,
-            p95: corners.p95,
-            max: corners.max,
-        },
-        radius: RadiusRange {
-            min: stats.radius.min,
-            median: stats.radius.median,
-            max: stats.radius.max,
-        },
+        corner_deviation: stats.corner_deviation,
+        radius: stats.radius,
         ..SkeletonBlock::default()
     }
 }

@@ -36,7 +36,7 @@ pub use checks::{Check, Limits, judge};
 pub use editing::EditBlock;
 pub use html::to_html;
 pub use repairs::{RepairsBlock, RoomBlock, VariantBlock};
-pub use shape::{BodyBlock, CornerDeviation, RadiusRange, SkeletonBlock, TopologyBlock};
+pub use shape::{BodyBlock, SkeletonBlock, TopologyBlock};
 pub use verification::{LoadCaseBlock, ProposalBlock, TetrahedraBlock, VerifyBlock};
 
 use crate::io::{IoError, atomic_write};

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::skeleton::{Deviation, Range};
 use crate::topology::{Betti, SurfaceTopology};
 
 /// Betti numbers of every stage; they must agree.
@@ -55,32 +56,10 @@ pub struct SkeletonBlock {
     pub spheres: usize,
     /// Share of inner points with four quads.
     pub regular_fraction: f64,
-    /// Deviation of the quads' corners from a right angle.
-    pub corner_deviation: CornerDeviation,
+    /// Deviation of the quads' corners from a right angle, degrees.
+    pub corner_deviation: Deviation,
     /// Radii, mm.
-    pub radius: RadiusRange,
-}
-
-/// Deviation from 90 degrees, degrees.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct CornerDeviation {
-    /// Mean.
-    pub mean: f64,
-    /// 95 % of the corners are better.
-    pub p95: f64,
-    /// Worst.
-    pub max: f64,
-}
-
-/// Radii, mm.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct RadiusRange {
-    /// Smallest.
-    pub min: f64,
-    /// Median.
-    pub median: f64,
-    /// Largest.
-    pub max: f64,
+    pub radius: Range,
 }
 
 /// The thickened and fitted body.
