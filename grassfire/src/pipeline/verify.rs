@@ -125,20 +125,12 @@ pub(super) fn prove(
     proposal: Option<&VoxelGrid<f32>>,
     monitor: &Monitor,
 ) -> Result<Verified, PipelineError> {
-    record
-        .stage(
-            "verify",
-            || -> Result<(Verified, VerifyBlock), VerifyError> {
-                let found = verify(case, folder, mesh, proposal, monitor)?;
-                let space = space(case, folder, &Monitor::default())?;
-                let block = block(case, &found, space);
-                Ok((found, block))
-            },
-        )
-        .map(|(found, block)| {
-            record.report.verify = Some(block);
-            found
-        })
+    let (found, space) = record.stage("verify", || {
+        let found = verify(case, folder, mesh, proposal, monitor)?;
+        Ok::<_, VerifyError>((found, space(case, folder, &Monitor::default())?))
+    })?;
+    record.report.verify = Some(block(case, &found, space));
+    Ok(found)
 }
 
 /// The full voxels of a density file: its array `full` where it has one, else what is above the threshold.
