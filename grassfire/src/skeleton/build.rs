@@ -5,9 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use super::anneal::{Annealing, anneal};
 use super::arcs;
+use super::bends::{bend_beams, lengthen_balls};
 use super::check::{check, check_cells, check_points};
 use super::coarsen::{Sizing, coarsen};
-use super::complex::{Class, Complex};
+use super::complex::Complex;
 use super::edges::edge;
 use super::layout::Layout;
 use super::members::burn_members;
@@ -324,53 +325,6 @@ fn clean(
         arcs::smooth(c, &traced, options.smoothing, 6);
     }
     Ok(())
-}
-
-/// Splits beams that cut a bend: an edge may subtend at most about 80 degrees.
-fn bend_beams(c: &mut Complex, reference: &Reference, unit: f64) {
-    for _ in 0..4 {
-        let beams: Vec<[u32; 2]> = c.alive_beams().collect();
-        let mut split = false;
-        for [a, b] in beams {
-            let ends = [a, b].map(|v| c.points[v as usize]);
-            let middle = (ends[0] + ends[1]) / 2.0;
-            let Some((x, r)) = reference.on_arc(&middle, Class::Beam, &ends) else {
-                continue;
-            };
-            let (sagitta, length) = ((x - middle).norm(), c.length(a, b));
-            if length > 2.0 * unit && sagitta > 0.18 * length && sagitta < 0.6 * length {
-                c.split(a, b, x, r);
-                split = true;
-            }
-        }
-        if !split {
-            break;
-        }
-    }
-    c.compact();
-}
-
-/// A component that shrank to one short beam (a ball) gets half a radius of length, so that it has a direction.
-fn lengthen_balls(c: &mut Complex) {
-    let tip = |c: &Complex, v: u32| {
-        c.vertex_beams[v as usize].len() == 1 && c.vertex_triangles[v as usize].is_empty()
-    };
-    let beams: Vec<[u32; 2]> = c.alive_beams().collect();
-    for [a, b] in beams {
-        let (i, j) = (a as usize, b as usize);
-        let wanted = 0.25 * (c.radii[i] + c.radii[j]);
-        let d = c.points[j] - c.points[i];
-        if tip(c, a) && tip(c, b) && d.norm() < wanted {
-            let direction = if d.norm() > 1e-9 * wanted {
-                d.normalize()
-            } else {
-                Vec3::x()
-            };
-            let centre = (c.points[i] + c.points[j]) / 2.0;
-            c.points[i] = centre - direction * (wanted / 2.0);
-            c.points[j] = centre + direction * (wanted / 2.0);
-        }
-    }
 }
 
 /// Turns the coarse triangulation into quads; false when the last resort (splitting all faces) was needed.

@@ -2,6 +2,7 @@
 
 mod anneal;
 mod arcs;
+mod bends;
 mod body_valence;
 mod build;
 mod check;
