@@ -38,14 +38,12 @@ const REACH: f64 = 3.0;
 const WEIGHT: f64 = 20.0;
 /// Weight of a place beside a gap, a voxel away from where it must be, at first.
 const PUSH: f64 = 4.0;
-/// Weight of what gaps leave against what overhangs: a wall that leans wrongly by a tenth of a degree leaves the mould, a lip does not.
-const GAPS: f64 = 4.0;
 /// Growth of both in a round.
 const GROWTH: f64 = 1.1;
 /// Weight of bending what is added, against moving it.
 const FAIRNESS: f64 = 1.0;
-/// A control point moves by at most this, voxels: a narrow rim of large quads moves by a small share of that.
-const MOST: f64 = 4.0;
+/// A control point moves by at most this, voxels.
+const MOST: f64 = 1.5;
 
 /// A piece of an upright wall.
 struct Piece {
@@ -65,7 +63,7 @@ struct Piece {
 /// 2. Rounds turn the pieces that lean inwards by less than half a degree (linearised, with a weight that grows), by the least
 ///    further move of control points at the same volume, bent as little as possible. At the same time the body's side moves out past
 ///    every gap between material along the draw direction (lines a quarter of a voxel apart, through body and `bosses`)
-///    which the proposal does not have, or the rim of a film below or above it moves in. Steps are shortened where they would create an
+///    which the proposal does not have, or a film that stands over it moves in. Steps are shortened where they would create an
 ///    intersection or a fold.
 /// 3. The round that leaves the least overhang and gaps is kept.
 ///
@@ -135,11 +133,10 @@ struct Looked {
 }
 
 impl Looked {
-    /// What is left, squared voxels: area times lean of what overhangs, and [`GAPS`] times the area of gaps as seen along the draw
-    /// direction.
+    /// What is left, squared voxels: area times lean of what overhangs, and the area of gaps as seen along the draw direction.
     fn left(&self) -> f64 {
         let overhang = self.pieces.iter().map(|p| p.area * (-p.lean).max(0.0));
-        overhang.sum::<f64>() + GAPS * self.gaps.area
+        overhang.sum::<f64>() + self.gaps.area
     }
 }
 

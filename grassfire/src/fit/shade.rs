@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use super::round::Solver;
 use crate::Vec3;
 use crate::casting::mould::dexels::{Dexels, Lattice, axes, dexels_on};
-use crate::mesh::{Bvh, Nearest, TriMesh, Winding};
+use crate::mesh::{Bvh, TriMesh, Winding};
 use crate::remesh::{Bosses, Capsule};
 use crate::voxel::VoxelGrid;
 
@@ -16,14 +16,8 @@ const PITCH: f64 = 0.25;
 const STEP: f64 = 0.5;
 /// The body's side moves past the gap by this, voxels: the union's edge there is no touch.
 const PROUD: f64 = 0.1;
-/// Of the material below and above a gap one goes where it is a film whose rim is no farther than this, voxels, and nearer than the gap.
+/// Of the material above and below a gap the shorter goes where it is a film no deeper than this, voxels, and nearer than the gap.
 const FILM: f64 = 0.5;
-/// Material longer than this along a line is no film, voxels.
-const LONG: f64 = 8.0;
-/// A film has its rim where its normal has at least this share across the draw direction.
-const RIM: f64 = 0.2;
-/// A point this far on the wrong side of the surface still lies on it, voxels: the ends of gaps do, but for rounding.
-const ROUNDING: f64 = 1e-6;
 /// Gaps farther from the body than this are not its work, voxels.
 const REACH: f64 = 2.0;
 /// Where the proposal itself has room of this depth the gap is a core's work, voxels.
@@ -50,10 +44,6 @@ pub(super) struct Pushes(BTreeMap<Side, Push>);
 impl Pushes {
     /// Asks more of the triangles beside gaps that are left.
     pub fn renew(&mut self, left: &Gaps) {
-        // What a triangle was asked before, the other way, would hold it where it is.
-        for (triangle, inwards) in left.pushes.0.keys() {
-            self.0.remove(&(*triangle, !inwards));
-        }
         self.0.extend(&left.pushes.0);
     }
 
@@ -139,9 +129,8 @@ impl<'a> Shade<'a> {
 
     /// What the gap between two intervals of a line asks for.
     ///
-    /// The body's side moves out past the gap, unless what lies below or above it is a film of the body whose rim is nearer to go: a
-    /// member that stands a little over the wall of a non-design body above and below, and not between, or a lip over the falling
-    /// wall of an eye.
+    /// The body's side moves out past the gap, unless the shorter of the two is a film of the body that is nearer to go: a member
+    /// that stands a little over the upright wall of a non-design body above and below, and not between.
     fn asked(
         &self,
         looked: &Looked,
@@ -158,18 +147,27 @@ impl<'a> Shade<'a> {
         if gap.is_empty() {
             return Vec::new();
         }
-        let film = |range: [f64; 2]| {
-            let film = range[1] - range[0] < LONG;
-            let points = film.then(|| along(range, false));
-            let away = |q: &Vec3| looked.trim(q, self.draw());
-            points.map(|points| points.iter().map(away).collect())
+        let length = |i: &[f64; 2]| i[1] - i[0];
+        let shorter = if length(&low) < length(&high) {
+            low
+        } else {
+            high
         };
-        let mut ways: Vec<Vec<Option<Asked>>> = vec![gap.iter().map(|q| looked.push(q)).collect()];
-        ways.extend([low, high].into_iter().filter_map(film));
-        let least = |a: &Vec<_>, b: &Vec<_>| deepest(a).total_cmp(&deepest(b));
-        let chosen = ways.into_iter().min_by(least).unwrap_or_default();
-        let asked = chosen.into_iter().flatten();
-        asked.map(|a| (a.side, a.push)).collect()
+        let film = along(shorter, false);
+        let past = |q| looked.push(q, REACH, false);
+        let away = |q| looked.push(q, FILM, true);
+        let fill: Vec<Option<Asked>> = gap.iter().map(past).collect();
+        let trim: Vec<Option<Asked>> = film.iter().map(away).collect();
+        let chosen = if deepest(&trim) < deepest(&fill) {
+            trim
+        } else {
+            fill
+        };
+        chosen
+            .into_iter()
+            .flatten()
+            .map(|a| (a.side, a.push))
+            .collect()
     }
 
     /// Intervals of body and walls together.
@@ -216,51 +214,26 @@ fn deepest(asked: &[Option<Asked>]) -> f64 {
 }
 
 impl Looked<'_> {
-    /// What a point of a gap asks of the nearest triangle: it moves out past it.
-    fn push(&self, q: &Vec3) -> Option<Asked> {
-        let (near, corners, normal) = self.nearest(q, REACH)?;
-        let way = (q - near.point).dot(&normal);
-        (way >= -ROUNDING).then(|| asked(&near, corners, false, (normal, way)))
-    }
-
-    /// What a point of a film outside the walls asks of the nearest triangle: the film's rim moves in past it, across the draw
-    /// direction. Along its normal a film would only become thinner, and never go.
-    fn trim(&self, q: &Vec3, draw: &Vec3) -> Option<Asked> {
-        let (near, corners, outward) = self.nearest(q, FILM)?;
-        let depth = (near.point - q).dot(&outward);
-        let across = outward - draw * outward.dot(draw);
-        // Where the nearest triangle is no rim, but the flat of a film, only its own normal is left.
-        let (inwards, level) = match across.norm() {
-            level if level > RIM => (-across / level, level),
-            _ => (-outward, 1.0),
-        };
-        if depth < 0.0 || depth > FILM * level || self.hidden.at(q) > 0.5 {
-            return None;
-        }
-        let inwards = (inwards, depth / level);
-        Some(asked(&near, corners, true, inwards))
-    }
-
-    /// The nearest triangle within `reach`, its corners and its outward normal.
-    fn nearest(&self, q: &Vec3, reach: f64) -> Option<(Nearest, [Vec3; 3], Vec3)> {
+    /// What a point, `inwards` one of a film outside the walls, asks of the nearest triangle within `reach`.
+    fn push(&self, q: &Vec3, reach: f64, inwards: bool) -> Option<Asked> {
         let near = self.bvh.nearest(q, reach)?;
         let [a, b, c] = self.samples.corners(near.triangle as usize);
         let outward = (b - a).cross(&(c - a)).try_normalize(1e-12)?;
-        Some((near, [a, b, c], outward))
-    }
-}
-
-/// A triangle moves along the unit vector `normal`, at its point that is the nearest one by the length `way` and a little more.
-fn asked(near: &Nearest, corners: [Vec3; 3], inwards: bool, (normal, way): (Vec3, f64)) -> Asked {
-    let push = Push {
-        share: shares(&near.point, corners),
-        normal,
-        height: near.point.dot(&normal) + way + PROUD,
-    };
-    Asked {
-        side: (near.triangle, inwards),
-        push,
-        way,
+        let normal = if inwards { -outward } else { outward };
+        let way = (q - near.point).dot(&normal);
+        if way < 0.0 || (inwards && self.hidden.at(q) > 0.5) {
+            return None;
+        }
+        let push = Push {
+            share: shares(&near.point, [a, b, c]),
+            normal,
+            height: q.dot(&normal) + PROUD,
+        };
+        Some(Asked {
+            side: (near.triangle, inwards),
+            push,
+            way,
+        })
     }
 }
 
@@ -336,36 +309,5 @@ mod tests {
         let least = least.fold(f64::INFINITY, f64::min);
         assert!((9.85..10.0).contains(&least), "{least}");
         assert!(shade.gaps(&body(9.95)).area == 0.0);
-    }
-
-    /// A lip of the body over the falling wall of an eye was asked to become thinner, and stayed.
-    #[test]
-    fn a_lip_over_the_falling_wall_of_an_eye_moves_across_the_draw_direction() {
-        let field = VoxelGrid::filled(Vec3::zeros(), 1.0, [25; 3], 0.0_f32);
-        // The wall falls from z = 10 at x = 10 to z = 0 at x = 20.
-        let mut surface = cuboid(Vec3::zeros(), Vec3::new(20.0, 10.0, 10.0));
-        let top = |p: &&mut Vec3| p.x > 15.0 && p.z > 5.0;
-        surface
-            .points
-            .iter_mut()
-            .filter(top)
-            .for_each(|p| p.x = 10.0);
-        let bosses = Bosses {
-            surface,
-            ..Bosses::default()
-        };
-        let shade = Shade::new(&field, &Vec3::z(), &bosses);
-        // The lip's rim stands half a voxel over it, with a slanted end.
-        let mut body = cuboid(Vec3::new(5.0, 2.0, 9.5), Vec3::new(11.0, 8.0, 10.3));
-        let lower = |p: &&mut Vec3| p.x > 10.5 && p.z < 10.0;
-        body.points
-            .iter_mut()
-            .filter(lower)
-            .for_each(|p| p.x = 10.2);
-        let gaps = shade.gaps(&body);
-        assert!(gaps.area > 1.0, "{}", gaps.area);
-        let mut inwards = gaps.pushes.0.iter().filter(|((_, inwards), _)| *inwards);
-        // The slanted end of the rim.
-        assert!(inwards.any(|(_, push)| (push.normal + Vec3::x()).norm() < 1e-9));
     }
 }
