@@ -56,8 +56,8 @@ impl Node {
         sum
     }
 
-    fn overlaps(&self, lo: &Vec3, hi: &Vec3) -> bool {
-        (0..3).all(|a| self.lo[a] <= hi[a] && lo[a] <= self.hi[a])
+    pub(crate) fn overlaps(&self, lo: &Vec3, hi: &Vec3) -> bool {
+        boxes_overlap([&self.lo, &self.hi], [lo, hi])
     }
 
     /// Entry distance of the ray, or infinity when it misses the box before `limit`.
@@ -237,14 +237,25 @@ impl Bvh {
                 continue;
             }
             for t in node.first..node.first + node.count {
-                let [a, b, c] = &self.corners[t as usize];
-                let (tlo, thi) = (a.inf(b).inf(c), a.sup(b).sup(c));
-                if (0..3).all(|k| tlo[k] <= hi[k] && lo[k] <= thi[k]) {
+                let [least, most] = triangle_box(&self.corners[t as usize]);
+                if boxes_overlap([&least, &most], [lo, hi]) {
                     visit(self.ids[t as usize]);
                 }
             }
         }
     }
+}
+
+/// Lower and upper corner of the box around a triangle.
+#[inline]
+pub(crate) fn triangle_box([a, b, c]: &[Vec3; 3]) -> [Vec3; 2] {
+    [a.inf(b).inf(c), a.sup(b).sup(c)]
+}
+
+/// Two closed boxes, each by its lower and upper corner, have a point in common.
+#[inline]
+pub(crate) fn boxes_overlap(a: [&Vec3; 2], b: [&Vec3; 2]) -> bool {
+    (0..3).all(|k| a[0][k] <= b[1][k] && b[0][k] <= a[1][k])
 }
 
 /// Appends the subtree over `items`, which start at `first` in tree order; its root comes first.

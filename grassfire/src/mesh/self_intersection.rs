@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
 use super::TriMesh;
-use super::bvh::{Bvh, Node};
+use super::bvh::{Bvh, Node, boxes_overlap, triangle_box};
 use crate::Vec3;
 
 /// Two triangles with a common edge count as folded over when, seen along that edge, they leave it
@@ -25,7 +25,7 @@ const FOLDED: f64 = 0.999_961_923;
 /// doi:10.1007/PL00009321.
 pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
     let tree = Bvh::new(mesh);
-    let boxes: Vec<Aabb> = tree.corners.iter().map(Aabb::around).collect();
+    let boxes: Vec<[Vec3; 2]> = tree.corners.iter().map(triangle_box).collect();
     let leaves: Vec<&Node> = tree.nodes.iter().filter(|node| node.right == 0).collect();
     let mut found: Vec<[u32; 2]> = leaves
         .par_iter()
@@ -45,37 +45,19 @@ pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
     found
 }
 
-#[derive(Clone, Copy)]
-struct Aabb {
-    lo: Vec3,
-    hi: Vec3,
-}
-
-impl Aabb {
-    fn around([a, b, c]: &[Vec3; 3]) -> Self {
-        Self {
-            lo: a.inf(b).inf(c),
-            hi: a.sup(b).sup(c),
-        }
-    }
-
-    fn overlaps(&self, lo: &Vec3, hi: &Vec3) -> bool {
-        (0..3).all(|a| self.lo[a] <= hi[a] && lo[a] <= self.hi[a])
-    }
-}
-
 /// Pairs of triangles, by their places in the order of the tree, whose boxes overlap: the first is in `leaf`, the second behind it.
 /// So each pair is met once.
-fn overlapping_pairs(tree: &Bvh, boxes: &[Aabb], leaf: &Node, mut visit: impl FnMut([usize; 2])) {
+fn overlapping_pairs(
+    tree: &Bvh,
+    boxes: &[[Vec3; 2]],
+    leaf: &Node,
+    mut visit: impl FnMut([usize; 2]),
+) {
     let range = |node: &Node| node.first as usize..(node.first + node.count) as usize;
-    let around = Aabb {
-        lo: leaf.lo,
-        hi: leaf.hi,
-    };
     let mut stack = vec![0u32];
     while let Some(top) = stack.pop() {
         let node = &tree.nodes[top as usize];
-        if range(node).end <= range(leaf).start || !around.overlaps(&node.lo, &node.hi) {
+        if range(node).end <= range(leaf).start || !leaf.overlaps(&node.lo, &node.hi) {
             continue;
         }
         if node.right != 0 {
@@ -85,7 +67,7 @@ fn overlapping_pairs(tree: &Bvh, boxes: &[Aabb], leaf: &Node, mut visit: impl Fn
         }
         for a in range(leaf) {
             for b in range(node).filter(|&b| b > a) {
-                if boxes[a].overlaps(&boxes[b].lo, &boxes[b].hi) {
+                if boxes_overlap(boxes[a].each_ref(), boxes[b].each_ref()) {
                     visit([a, b]);
                 }
             }
